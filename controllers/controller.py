@@ -1,4 +1,4 @@
-"""The controller protocol: `reset` with the reference and the station, `act` for each voltage."""
+"""What a controller has: `reset` with the reference and the station, `act` for each voltage."""
 
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Protocol, runtime_checkable

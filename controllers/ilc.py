@@ -201,7 +201,7 @@ class LearningTrials:
 
 def loose_load(station: StationInfo) -> float:
     """Load (N) below which the cable may be slack, so that the position says nothing."""
-    return LOOSE_N if station.task.protocol.followed.is_angle else -math.inf
+    return LOOSE_N if station.task.schedule.followed.is_angle else -math.inf
 
 
 def tight(taut: Sequence[bool]) -> NDArray[np.bool_]:

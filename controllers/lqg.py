@@ -124,7 +124,7 @@ class LQG:
         if free is not None:
             a = np.eye(len(free[0]), k=1)
             a[:, 0] = free[0]
-            turns = station.task.exercise is None and station.task.protocol.followed.is_angle
+            turns = station.task.exercise is None and station.task.schedule.followed.is_angle
             lengths = 1.0 if turns else station.model.parameters["rotor"].radius
             weight = lengths / self._stroke.models[0].gain
             self._free_gains = regulator(a, free[1], weight, settings.effort)
@@ -170,7 +170,7 @@ class LQG:
         What noise pushes there stays. But a rotor that is far behind and falls further back coasts
         away, and nothing else stops it.
         """
-        far = behind < -FAR_SHARE * self._motion.station.task.protocol.span
+        far = behind < -FAR_SHARE * self._motion.station.task.schedule.span
         return FREE_MOST_V if far and behind < self._behind else 0.0
 
     def linear(self, station: StationInfo, position: float) -> "control.StateSpace":
@@ -182,7 +182,7 @@ class LQG:
         import control
 
         settings = self._settings(station)
-        motion = nominal_motion(station.task.protocol.at, station)
+        motion = nominal_motion(station.task.schedule.at, station)
         at = motion.stroke.nearest(position)
         local, held = motion.stroke.models[at], motion.stroke.volts[at]
         drift = np.hypot(settings.disturbance, SHARE * held / SHARE_TIME_S**0.5)

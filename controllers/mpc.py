@@ -179,7 +179,7 @@ class _Trial:
         self.wanted = np.array([reference(time) for time in times.tolist()])
         self.horizon = max(2, round(settings.horizon / station.period))
         self.delay = round(station.action_delay / station.period)
-        said = ModelKey(station.model), task.protocol.quantity, task.load, station.pressure
+        said = ModelKey(station.model), task.schedule.quantity, task.load, station.pressure
         follows = self.needed.tobytes(), self.wanted.tobytes()
         self._key = *said, station.period, self.delay, settings, *follows
 

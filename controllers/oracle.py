@@ -87,10 +87,10 @@ class Oracle:
             ValueError: it was not shown the environment.
         """
         environment = self._seen()
-        plant, protocol = environment.plant, station.task.protocol
+        plant, schedule = environment.plant, station.task.schedule
         self._regulates = station.task.actuator == "regulator"
-        self._period, self._unit = station.period, SI_FACTORS[protocol.unit]
-        self._quantity = protocol.quantity
+        self._period, self._unit = station.period, SI_FACTORS[schedule.unit]
+        self._quantity = schedule.quantity
         delay = round(station.action_delay / station.period)
         # Commands on their way are the first of every plan, and fixed.
         self._sent = np.full(delay, self._delayed(environment))

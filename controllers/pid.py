@@ -63,7 +63,7 @@ class PID:
         """
         self._reference = reference
         self._position, self._period = station.position, station.period
-        self._span = station.task.protocol.span
+        self._span = station.task.schedule.span
         self.gains = self._given or scheduled_gains(self.name, station)
         self._ahead = self.gains.lead - station.observation_delay
         self._offset = nominal_offset(station)
@@ -96,7 +96,7 @@ class PID:
         import control
 
         gains = self._given or scheduled_gains(self.name, station)
-        law = linear_law(gains.scaled(position / station.task.protocol.span), station.period)
+        law = linear_law(gains.scaled(position / station.task.schedule.span), station.period)
         return control.StateSpace(*law, station.period)
 
 

@@ -185,7 +185,7 @@ class EarlierTrials:
             return np.interp(taken, instants, moves)
 
         mean, places = np.mean(self._readings, axis=0), shown(np.mean(self._moves, axis=0))
-        column = Measurement._fields.index(station.task.protocol.quantity) - 1
+        column = Measurement._fields.index(station.task.schedule.quantity) - 1
         apart = [
             readings[:, column] - mean[:, column] - shown(moves) + places
             for readings, moves in zip(self._readings, self._moves, strict=True)

@@ -45,10 +45,10 @@ class SerresFeedforward(VoltageTable):
                 f"rotation, got {station.task.name}, in which the {station.task.actuator} moves; "
                 "take improved_feedforward"
             )
-        rotation = station.task.protocol.followed.is_angle
+        rotation = station.task.schedule.followed.is_angle
         radius = PROFILE_RADIUS if rotation else 1.0
         pressure_kpa = station.pressure / 1e3
-        samples = math.ceil(station.task.protocol.duration / SAMPLE_TIME - 1e-9) + 1
+        samples = math.ceil(station.task.schedule.duration / SAMPLE_TIME - 1e-9) + 1
         times = SAMPLE_TIME * np.arange(samples)
         wanted = radius * np.array([reference(float(time)) for time in times])
         try:

@@ -24,7 +24,7 @@ def first_controller_plot() -> bytes:
         for controller, label, color in ((integral(), "Integral", ORANGE), (PID(), "PID", BLUE)):
             environment = make_environment("displacement", "station", PRESSURE_KPA)
             trial = rollout(environment, controller, seed=1).trial
-            ideal = 1e3 * environment.task.protocol.reference(trial.time)
+            ideal = 1e3 * environment.task.schedule.reference(trial.time)
             extension = 1e3 * trial.truth["extension"]
             curves = (extension, extension - ideal, trial.commands["motor_voltage"])
             for axis, values in zip(axes, curves, strict=True):

@@ -12,9 +12,9 @@ from typing import NamedTuple
 import numpy as np
 from matplotlib.figure import Figure
 
-from pma_gym.data.protocol import DISPLACEMENT
 from pma_gym.data.serres2008 import load_table, pressures
 from pma_gym.data.trial import Trial
+from pma_gym.data.trial_schedule import DISPLACEMENT
 from pma_gym.files import OutputError, check_output, replace_file
 from pma_gym.metrics import PHASE_SAMPLES, SAMPLE_RATE_HZ
 from pma_gym.pages.figures import legend_below, picture, png

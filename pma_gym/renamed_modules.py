@@ -30,6 +30,7 @@ RENAMED_MODULES: Mapping[str, str] = {
     "pma_gym.envs.sb3_policy": "pma_gym.sb3.policy",
     "pma_gym.envs.sb3_ppo": "pma_gym.sb3.ppo",
     "pma_gym.data.dataset": "pma_gym.data.datasets.dataset",
+    "pma_gym.data.protocol": "pma_gym.data.trial_schedule",
     "pma_gym.data.trial_files": "pma_gym.data.files.trial_files",
     "pma_gym.data.trial_values": "pma_gym.data.files.trial_values",
     "pma_gym.effects.slide.operator": "pma_gym.effects.slide.hand_push",
@@ -68,7 +69,9 @@ class _RenamedLoader(Loader):
         new = importlib.import_module(self._new)
 
         def lookup(name: str) -> Any:  # noqa: ANN401 - whatever the module holds
-            return getattr(new, name)
+            with warnings.catch_warnings():  # One warning: names that changed too say it in `new`.
+                warnings.simplefilter("ignore", DeprecationWarning)
+                return getattr(new, name)
 
         module.__doc__ = new.__doc__
         module.__dict__["__getattr__"] = lookup

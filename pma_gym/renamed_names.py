@@ -1,5 +1,6 @@
 """Classes, functions and attributes by their old names: they work, with a deprecation warning."""
 
+import sys
 import warnings
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -17,18 +18,19 @@ def warn_renamed(what: str, new: str, stacklevel: int = 3) -> None:
 
 
 def renamed_names(module: str, names: Mapping[str, Any]) -> Callable[[str], Any]:
-    """The `__getattr__` of a module whose old names are classes or functions that have new ones.
+    """The `__getattr__` of a module some of whose names have changed.
 
     Args:
         module: the module's name.
-        names: what each old name stands for.
+        names: what each old name stands for: a class or function, or the new name of a constant.
     """
 
     def lookup(name: str) -> Any:  # noqa: ANN401 - whatever the name stands for
         if name not in names:
             raise AttributeError(f"module {module!r} has no attribute {name!r}")
-        warn_renamed(f"{module}.{name}", names[name].__name__)
-        return names[name]
+        new = names[name]
+        warn_renamed(f"{module}.{name}", new if isinstance(new, str) else new.__name__)
+        return getattr(sys.modules[module], new) if isinstance(new, str) else new
 
     return lookup
 

@@ -11,15 +11,11 @@ import pytest
 from pma_gym.cli import main
 from pma_gym.data.files.trial_files import read_trial, write_trial
 from pma_gym.data.trial import Trial
-from pma_gym.discovery.diagnosis import (
-    Diagnosis,
-    Estimate,
-    Gap,
-    Judgement,
-    Moved,
-    NextExperiment,
-    Place,
-)
+from pma_gym.discovery.diagnosis import Diagnosis
+from pma_gym.discovery.result.estimates import Estimate, Moved
+from pma_gym.discovery.result.misfit import Gap, Place
+from pma_gym.discovery.result.next_experiment import NextExperiment
+from pma_gym.discovery.result.noise import Judgement
 from pma_gym.plant.model import load_model
 
 TIME = np.arange(20) / 10

@@ -82,7 +82,7 @@ def test_a_film_is_an_mp4(run, folder):
 def test_a_class_of_a_users_own_drives_the_window(run, source):
     pytest.importorskip("pygame")
     code, out, _ = run("--controller", source)
-    reference = TASKS["displacement"].protocol.at
+    reference = TASKS["displacement"].schedule.at
     volts = last_rmse(lambda e: 100.0 * (reference(e.time) - e.measurement.extension) + 1.0)
     assert (code, out.strip()) == (0, volts)
 

@@ -71,7 +71,7 @@ def test_example_of_a_controller_is_scored(tmp_path):
         line
         for block in blocks("bash", FIRST_CONTROLLER)
         for line in block.splitlines()
-        if "integral.py:Integral --out" in line
+        if "pid,docs/examples/integral.py:Integral --out" in line
     )
     _, controllers, _, out = command.split("-m benchmarks ")[1].split()
     mine = controllers.split(",")[1]

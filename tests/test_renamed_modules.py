@@ -37,8 +37,8 @@ def test_an_old_name_gives_the_new_modules_names_and_warns_once(old, forgotten):
 
 
 def test_a_pickle_that_names_an_old_module_loads(forgotten):
-    """By protocol 0, where names are text without a length."""
-    new = pickle.dumps(Options, protocol=0)
+    """In the oldest format, where names are text without a length."""
+    new = pickle.dumps(Options, 0)
     old = new.replace(b"pma_gym.engine.options", b"pma_gym.envs.options")
     assert old != new
     with pytest.warns(DeprecationWarning, match="pma_gym.engine.options"):

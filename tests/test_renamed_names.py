@@ -1,6 +1,7 @@
 """Old names of classes and attributes work, with one warning that says the new one."""
 
 import importlib
+import sys
 import warnings
 
 import pytest
@@ -9,12 +10,15 @@ from benchmarks.suites.frozen import frozen_suite
 from benchmarks.suites.suite import SUITES
 from controllers.policies.document import parsed_document
 from controllers.policy import shipped_policies
+from pma_gym.data.trial_schedule import TrialSchedule
 from pma_gym.envs import Measurement, PMAEnv, PMAVectorEnv, StationInfo
 from pma_gym.plant.model import ModelError, dump_model, load_model
 from pma_gym.tasks import (
+    TASKS,
     MomentProfile,
     Operator,
     OperatorState,
+    Task,
     infeasibility_reason,
     moment_profile,
 )
@@ -41,6 +45,38 @@ def test_an_old_class_name_is_the_new_class(module, old, new):
 def test_an_old_name_of_the_tasks_is_the_new_class(old, new):
     with pytest.warns(DeprecationWarning, match=f"pma_gym.tasks.{old} is now {new.__name__}"):
         assert getattr(importlib.import_module("pma_gym.tasks"), old) is new
+
+
+@pytest.mark.parametrize(
+    ("old", "new"), [("Protocol", "TrialSchedule"), ("PROTOCOLS", "SCHEDULES")]
+)
+def test_an_old_name_of_a_class_or_constant_of_the_schedules_is_the_new_one(old, new):
+    module = importlib.import_module("pma_gym.data.trial_schedule")
+    with pytest.warns(DeprecationWarning, match=f"{old} is now {new}"):
+        assert getattr(module, old) is getattr(module, new)
+
+
+def test_an_import_by_the_old_module_and_class_warns_once(tmp_path, monkeypatch):
+    (tmp_path / "earlier_task.py").write_text("from pma_gym.data.protocol import Protocol\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.delitem(sys.modules, "pma_gym.data.protocol", raising=False)
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("default")
+        assert importlib.import_module("earlier_task").Protocol is TrialSchedule
+    assert [str(one.message).split(";")[0] for one in said] == [
+        "module pma_gym.data.protocol is now pma_gym.data.trial_schedule"
+    ]
+
+
+def test_a_task_knows_its_schedule_by_the_old_name_too():
+    task, schedule = TASKS["displacement"], TASKS["displacement"].schedule
+    with pytest.warns(DeprecationWarning, match="Task.protocol is now schedule"):
+        assert task.protocol is schedule
+    with pytest.warns(DeprecationWarning, match="is now Task"):
+        assert (
+            Task(task.name, protocol=schedule, lowest_pressure=150e3, highest_pressure=575e3)
+            == task
+        )
 
 
 def test_a_name_that_never_was_is_missing():

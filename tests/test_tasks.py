@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pma_gym.data.protocol import DISPLACEMENT, ROTATION
 from pma_gym.data.serres2008 import load_table
+from pma_gym.data.trial_schedule import DISPLACEMENT, ROTATION
 from pma_gym.metrics import phase_times
 from pma_gym.plant.model import load_model
 from pma_gym.tasks import (
@@ -36,7 +36,7 @@ SAMPLES = {"displacement": 1923, "rotation": 5763}
 
 
 def ideal(name: str) -> np.ndarray:
-    return TASKS[name].protocol.reference(np.arange(SAMPLES[name]) / 384.0)
+    return TASKS[name].schedule.reference(np.arange(SAMPLES[name]) / 384.0)
 
 
 def test_a_trial_lasts_to_its_last_sample():
@@ -48,7 +48,7 @@ def test_a_trial_lasts_to_its_last_sample():
 @pytest.mark.parametrize("name", TASKS)
 def test_the_ideal_has_no_error_but_past_the_ends_of_ramps(name):
     # A phase is scored on its own line, the reference turns: two samples of 5 ms are beyond.
-    for phase, error in phase_errors(TASKS[name].protocol, ideal(name)).items():
+    for phase, error in phase_errors(TASKS[name].schedule, ideal(name)).items():
         assert len(error) == 1923
         np.testing.assert_allclose(error[:1921], 0.0, atol=1e-12, err_msg=phase)
 
@@ -103,10 +103,10 @@ def test_names_of_tasks_are_their_keys():
 @pytest.mark.parametrize("task", UNSEEN.values(), ids=UNSEEN)
 def test_unseen_references_begin_at_rest_and_stay_within_the_range(task):
     base = TASKS["rotation" if task.name.startswith("rotation") else "displacement"]
-    assert (task.actuator, task.protocol.quantity) == ("motor", base.protocol.quantity)
-    assert task.starts == base.starts and task.protocol.span == base.protocol.span
+    assert (task.actuator, task.schedule.quantity) == ("motor", base.schedule.quantity)
+    assert task.starts == base.starts and task.schedule.span == base.schedule.span
     assert task.steps(100.0) == 1001
-    share = task.protocol.reference(np.arange(3841) / 384.0) / task.protocol.span
+    share = task.schedule.reference(np.arange(3841) / 384.0) / task.schedule.span
     assert share[0] == 0.0 and share.min() >= 0.0 and 0.6 < share.max() <= 0.95 + 1e-9
     if "sine" in task.name:
         assert abs(share[1] - share[0]) * 384.0 < 1e-3
@@ -120,7 +120,7 @@ def test_drawn_tasks_are_known_by_their_number():
     assert task == multisine("rotation", 17) and task.name == "rotation_multisine_17"
     assert task != multisine("rotation", 18)
     assert (
-        named_task("rotation_multisine").protocol.phases == multisine("rotation", 0).protocol.phases
+        named_task("rotation_multisine").schedule.phases == multisine("rotation", 0).schedule.phases
     )
     assert named_task("displacement") is TASKS["displacement"]
     for name in ("rotation_sine_1", "displacement_steps_", "displacement_steps_01", "steps_1", ""):
@@ -134,9 +134,9 @@ def test_the_station_can_follow_everything_but_steps_and_the_way_back_to_zero(na
     low, high = task.starts
     reason = infeasibility_reason(task, "station", low + pressure * (high - low))
     if name.endswith("steps"):
-        jump = np.abs(np.diff(task.protocol.reference(np.arange(3841) / 384.0)))
-        size = jump[jump > 0.0][0] / SI_FACTORS[task.protocol.unit]
-        assert reason == f"the reference jumps by {size:.3g} {task.protocol.unit} at 0.5 s"
+        jump = np.abs(np.diff(task.schedule.reference(np.arange(3841) / 384.0)))
+        size = jump[jump > 0.0][0] / SI_FACTORS[task.schedule.unit]
+        assert reason == f"the reference jumps by {size:.3g} {task.schedule.unit} at 0.5 s"
     elif name == "rotation":
         assert "the cable would have to push" in reason and "first at 14." in reason
     else:
@@ -189,7 +189,7 @@ def test_the_isotonic_stroke_is_within_what_table_i3_shows():
     assert reached[575.0] == pytest.approx(55.9, abs=0.05)
     task = ISOTONIC["isotonic"]
     assert task.starts[1] == 350e3
-    assert 1e3 * task.protocol.span < reached[575.0] - reached[350.0]
+    assert 1e3 * task.schedule.span < reached[575.0] - reached[350.0]
 
 
 SAFE = {"contraction": 0.04, "load": 300.0, "pressure": 300e3}

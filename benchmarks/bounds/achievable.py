@@ -47,11 +47,11 @@ def achievable_bound(model: str | Model, task: str, pressure_kpa: float) -> dict
     Returns:
         RMSE by phase name, in mm (displacement) or deg (rotation).
     """
-    protocol = TASKS[task].protocol
+    schedule = TASKS[task].schedule
     positions = _ideal_positions(load_model(model), task, pressure_kpa)
-    errors = [phase_rmse(protocol, position) for position in positions]
-    unit = SI_FACTORS[protocol.unit]
-    return {phase.name: min(f[phase.name] for f in errors) / unit for phase in protocol.phases}
+    errors = [phase_rmse(schedule, position) for position in positions]
+    unit = SI_FACTORS[schedule.unit]
+    return {phase.name: min(f[phase.name] for f in errors) / unit for phase in schedule.phases}
 
 
 def _ideal_positions(model: Model, task: str, pressure_kpa: float) -> Iterator[np.ndarray]:
@@ -60,7 +60,7 @@ def _ideal_positions(model: Model, task: str, pressure_kpa: float) -> Iterator[n
     plant = Plant(model)
     for rate in INVERSE_RATES_HZ:
         station = StationInfo(plant.model, TASKS[task], 1e3 * pressure_kpa, 1.0 / rate)
-        needed = nominal_motion(station.task.protocol.at, station).volts
+        needed = nominal_motion(station.task.schedule.at, station).volts
         yield from open_loop_positions([plant], station, [needed])
 
 

@@ -50,7 +50,7 @@ def open_loop_positions(
         for plant, own in zip(plants, volts, strict=True)
     ]
     simulate_all(plants[0].program, runs)
-    kept, quantity = np.searchsorted(time, sampled), station.task.protocol.quantity
+    kept, quantity = np.searchsorted(time, sampled), station.task.schedule.quantity
     return [
         plant.observe(run.states[kept], run.zero_contraction)[quantity].copy()
         for plant, run in zip(plants, runs, strict=True)

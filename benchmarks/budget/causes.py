@@ -78,7 +78,7 @@ def causes_of(task: str) -> tuple[str, ...]:
     return tuple(
         cause
         for cause in CAUSES
-        if EVERY_TASK[task].protocol.followed.is_angle or cause not in OF_ROTATION
+        if EVERY_TASK[task].schedule.followed.is_angle or cause not in OF_ROTATION
     )
 
 
@@ -112,7 +112,7 @@ class OpenLoop:
 
     def __init__(self, plant: Plant, station: StationInfo) -> None:
         self.plant, self.station = plant, station
-        self.rotation = station.task.protocol.followed.is_angle
+        self.rotation = station.task.schedule.followed.is_angle
         self.profile = profile_model(station.pressure / 1e3)
         parameters = plant.model.parameters
         self.cable, self.drive, self.rotor = (parameters[n] for n in ("cable", "drive", "rotor"))
@@ -146,14 +146,14 @@ class OpenLoop:
     @cached_property
     def improved(self) -> Array:
         """Voltages of `ImprovedFeedforward` (V), shape (steps,)."""
-        protocol = self.station.task.protocol
-        motion = nominal_motion(lambda time: float(protocol.reference(time)), self.station)
+        schedule = self.station.task.schedule
+        motion = nominal_motion(lambda time: float(schedule.reference(time)), self.station)
         return np.clip(motion.volts, 0.0, 10.0)
 
     @property
     def _samples(self) -> Array:
         """Times of the dissertation's samples (s)."""
-        return SAMPLE_TIME * np.arange(round(self.station.task.protocol.duration / SAMPLE_TIME) + 1)
+        return SAMPLE_TIME * np.arange(round(self.station.task.schedule.duration / SAMPLE_TIME) + 1)
 
     def _interpolated(self, samples: Array, times: Array, interpolation: Interpolation) -> Array:
         if interpolation == "foh":
@@ -200,7 +200,7 @@ class OpenLoop:
     def _motion(self, times: Array, faults: frozenset[str]) -> Motion:
         """What is wanted; at t = 0 still at rest."""
         radius, before = self._radius(faults), 1e-6
-        reference = self.station.task.protocol.reference
+        reference = self.station.task.schedule.reference
         extension = radius * reference(times)
         speed = (extension - radius * reference(times - before)) / before
         if self.rotation:
@@ -222,7 +222,7 @@ class OpenLoop:
     @cached_property
     def _chatter(self) -> Array:
         """What the recursion's inverse adds to y + y' / A at its samples (m), for a radius of 1."""
-        wanted, rate = self.station.task.protocol.reference(self._samples), self.profile.muscle_rate
+        wanted, rate = self.station.task.schedule.reference(self._samples), self.profile.muscle_rate
         transfer = cascade_transfer(rate, MOTOR_RATE)
         given = inverse_recursion(wanted, tustin_recursion(transfer, SAMPLE_TIME))
         return given - wanted - np.diff(wanted, prepend=0.0) / SAMPLE_TIME / rate

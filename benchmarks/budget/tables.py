@@ -28,7 +28,7 @@ DRAWN_COLUMNS = (
 
 def unit_of(task: str) -> str:
     """Unit of a task's errors: mm or deg."""
-    return TASKS[task].protocol.unit
+    return TASKS[task].schedule.unit
 
 
 def waterfall_rows(budgets: Sequence[Budget], phase: str) -> Rows:

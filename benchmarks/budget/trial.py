@@ -59,7 +59,7 @@ class Budget:
     @property
     def phases(self) -> tuple[str, ...]:
         """Phases, and `all` where there are several."""
-        names = tuple(phase.name for phase in TASKS[self.task].protocol.phases)
+        names = tuple(phase.name for phase in TASKS[self.task].schedule.phases)
         return (*names, "all") if len(names) > 1 else names
 
     @property
@@ -123,11 +123,11 @@ def simulated_errors(
     plants: Sequence[Plant], station: StationInfo, volts: Sequence[NDArray[np.float64]]
 ) -> list[Errors]:
     """RMSE (mm or deg) by phase of open-loop trials, one for each plant and its voltages."""
-    unit, results = SI_FACTORS[station.task.protocol.unit], []
+    unit, results = SI_FACTORS[station.task.schedule.unit], []
     for k in range(0, len(volts), AT_ONCE):
         part = slice(k, k + AT_ONCE)
         for position in open_loop_positions(plants[part], station, volts[part]):
-            errors = phase_rmse(station.task.protocol, position)
+            errors = phase_rmse(station.task.schedule, position)
             results.append({name: value / unit for name, value in errors.items()})
     return results
 
@@ -149,9 +149,9 @@ def _variants(open_loop: OpenLoop) -> dict[str, Errors]:
 
 def _measured(task: str, pressure_kpa: float) -> Errors:
     """The dissertation's RMSE (mm or deg) by phase."""
-    protocol = TASKS[task].protocol
+    schedule = TASKS[task].schedule
     errors = {
-        phase.name: measured_score(task, phase.name, pressure_kpa).rmse for phase in protocol.phases
+        phase.name: measured_score(task, phase.name, pressure_kpa).rmse for phase in schedule.phases
     }
     return errors | {"all": math.sqrt(np.mean(np.square(list(errors.values()))))}
 

@@ -80,6 +80,7 @@ def report(
     ] = None,
 ) -> None:
     """Write a suite's page, its leaderboard, from the journal of its run."""
+    from benchmarks.comparison.command_lines import run_command
     from benchmarks.executors.choice import local
     from benchmarks.report.publish import run_report
     from benchmarks.reproduction.job import report_again
@@ -93,8 +94,11 @@ def report(
         if isinstance(frozen, ReproductionSuite):
             page = report_again(frozen, folder, out or folder, local(2))
         else:
-            page, ranks = run_report(frozen, folder, out or folder)
+            page, ranks, incomplete = run_report(frozen, folder, out or folder)
             print_table(ranks)
+            if incomplete:
+                print(f"Not complete, so not in every column: {incomplete}")
+                print(f"Run the rest: {run_command(frozen, folder)}")
         print(f"Report: {page}")
     except SuiteError as error:
         refuse(error)

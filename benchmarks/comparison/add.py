@@ -18,6 +18,7 @@ from benchmarks.runner.case import BY_LIMIT, Row
 from benchmarks.runner.controller_spec import ControllerError, ControllerSpec
 from benchmarks.runner.execution import PendingCases, compile_kernels, execute, pending_cases
 from benchmarks.runner.provenance import check_folder, run_info, write_run
+from benchmarks.runner.run import plain_progress
 from benchmarks.runner.user_controller import MAKE_S, probe
 from benchmarks.suites.reproduction import ReproductionSuite
 from benchmarks.suites.suite import FrozenSuite, SuiteError
@@ -128,13 +129,17 @@ def _run(
     troubles = 0
     with console.status("drawing the stations, compiling their equations"):
         compile_kernels(todo.suite)
-    with Progress(console=console, transient=True) as progress:
+    with (
+        Progress(console=console, transient=True) as progress,
+        plain_progress(console, len(rows), len(todo.cases)) as say,
+    ):
         bar = progress.add_task(escape(todo.suite.name), total=len(todo.cases), completed=len(rows))
 
         def on_done(row: Row) -> None:
             nonlocal troubles
             rows.append(row)
             progress.update(bar, advance=1)
+            say(len(rows))
             troubles += bool(row["failure"]) and BY_LIMIT not in row["failure"]
             if troubles >= ENOUGH:
                 raise _EnoughError

@@ -51,7 +51,7 @@ def run_voltages(order: Order, out: Path) -> int:
     """
     environment = _environment(order)
     rows = list(_rows(order, environment))
-    unit = environment.task.protocol.unit
+    unit = environment.task.schedule.unit
     text = io.StringIO()
     text.write(
         f"# {order.controller}, {order.task}, {order.pressure_kpa:g} kPa, {order.rate_hz:g} Hz, "
@@ -93,7 +93,7 @@ def _environment(order: Order) -> PMAEnv:
 def _rows(order: Order, environment: PMAEnv) -> Iterator[tuple[str, ...]]:
     """Rows as text: time (s), motor and regulator voltage (V), reference in the task's unit."""
     task, period = environment.task, environment.options.period
-    unit = SI_FACTORS[task.protocol.unit]
+    unit = SI_FACTORS[task.schedule.unit]
     controller = CONTROLLERS[order.controller]()
     controller.reset(environment.reference, environment.station)
     motor, regulator = environment.motor_voltage, environment.regulator_voltage

@@ -57,7 +57,9 @@ from pma_gym.discovery.fitting.fit_problem import FitProblem, Fitted  # noqa: E4
 from pma_gym.discovery.fitting.free_parameters import free_parameters  # noqa: E402
 from pma_gym.discovery.preparation.noise import Whitening  # noqa: E402
 from pma_gym.discovery.screening.candidates import candidate_effects  # noqa: E402
-from pma_gym.discovery.screening.score_test import Baseline, screen, starting_points  # noqa: E402
+from pma_gym.discovery.screening.probe_scores import Baseline  # noqa: E402
+from pma_gym.discovery.screening.score_test import screen  # noqa: E402
+from pma_gym.discovery.screening.starting_points import starting_points  # noqa: E402
 from pma_gym.files import replace_file  # noqa: E402
 from pma_gym.plant.model import Model, load_model  # noqa: E402
 

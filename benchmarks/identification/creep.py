@@ -1,6 +1,6 @@
-"""Whether the station needs creep: I3's protocol with a quick branch of it, judged left out.
+"""Whether the station needs creep: I3's load cycle with a quick branch of it, judged left out.
 
-Protocol of I3 at the pace of its ramps, quasi-static but for what is viscous: with F(P, x) the
+Load cycle of I3 at the pace of its ramps, quasi-static but for what is viscous: with F(P, x) the
 static force, H z the hysteresis, B the damping, f the force in the branch (`effects.creep`),
 
     F(P, x) - H z - f - B x' = load,    f' = c x' - f / tau
@@ -11,7 +11,7 @@ a part. It begins settled: f = 0, z as the model's trials begin.
 The rule, fixed before any trial of tables 20-30 is replayed: creep joins the model if the 95 %
 interval of its stiffness (jackknife over pressures) excludes 0 and if it lowers the squared misfit
 at left-out pressures, over all pressures in turn, by more than chance would (paired Student's t,
-two-sided 95 %). Tables 20-30 take no part. One protocol has one pace, which tells a stiffness at a
+two-sided 95 %). Tables 20-30 take no part. A load cycle has one pace, which tells a stiffness at a
 given time constant and not both: the time constant is the literature's.
 """
 
@@ -20,7 +20,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from benchmarks.identification.statics import RAMP_S, Protocol
+from benchmarks.identification.statics import RAMP_S, LoadCycleReadings
 from benchmarks.identification.transients import damping_of
 from pma_gym.plant.model import Model
 from pma_gym.plant.statics import contraction_at, muscle_force
@@ -56,8 +56,10 @@ def branch_of(model: Model) -> Branch:
     return Branch(0.0, 1.0) if creep is None else Branch(creep.stiffness, creep.time_constant)
 
 
-def protocol_with_creep(model: Model, pressure: np.ndarray, load: np.ndarray) -> Protocol:
-    """What a model predicts for I3's protocol, with its branch of creep.
+def load_cycle_with_creep(
+    model: Model, pressure: np.ndarray, load: np.ndarray
+) -> LoadCycleReadings:
+    """What a model predicts for I3's load cycle, with its branch of creep.
 
     Args:
         model: a station's model with hysteresis and damping, and creep or none.
@@ -74,7 +76,7 @@ def protocol_with_creep(model: Model, pressure: np.ndarray, load: np.ndarray) ->
     x1 = quasi_static.contraction.copy()
     for share in shares:
         quasi_static.part((1.0 - share) * load, 1.0)
-    return Protocol(x0, x0 - x1, quasi_static.contraction - x1)
+    return LoadCycleReadings(x0, x0 - x1, quasi_static.contraction - x1)
 
 
 class CreepFold(NamedTuple):

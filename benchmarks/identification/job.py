@@ -15,7 +15,7 @@ from benchmarks.executors.choice import local
 from benchmarks.executors.executor import run_or_raise
 from benchmarks.files import write_text
 from benchmarks.identification import judge, statics
-from benchmarks.identification.creep import STUDENT_10, CreepFold, decided, protocol_with_creep
+from benchmarks.identification.creep import STUDENT_10, CreepFold, decided, load_cycle_with_creep
 from benchmarks.identification.measurements import StationLimits, station_limits
 from benchmarks.identification.station import fitted_parameters, identify, leave_out
 from benchmarks.identification.transients import PressureSteps, pressure_steps
@@ -95,11 +95,11 @@ def _fold(
     plain, creeping = (identify(*others, start, creeps) for creeps in (False, True))
     missed = [
         float(np.mean(statics.weighted(plain, here, none) ** 2)),
-        float(np.mean(statics.weighted(creeping, here, none, protocol_with_creep) ** 2)),
+        float(np.mean(statics.weighted(creeping, here, none, load_cycle_with_creep) ** 2)),
     ]
     return Fold(
         (plain, judge.left_out(plain, here)),
-        (creeping, judge.left_out(creeping, here, protocol_with_creep)),
+        (creeping, judge.left_out(creeping, here, load_cycle_with_creep)),
         CreepFold(fitted_parameters(creeping)["creep.stiffness_n_per_mm"], *missed),
     )
 

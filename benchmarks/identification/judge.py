@@ -31,9 +31,9 @@ class LeftOut:
 
 
 def left_out(
-    model: Model, data: StationLimits, predict: statics.Predict = statics.protocol
+    model: Model, data: StationLimits, predict: statics.Predict = statics.load_cycle
 ) -> LeftOut:
-    """Errors of a model at rows of one pressure, whose protocol something predicts."""
+    """Errors of a model at rows of one pressure, whose load cycle something predicts."""
     predicted = predict(model, data.pressure, data.load)
     rotor, cable = model.parameters["rotor"], model.parameters["cable"]
     pulley = lines.Pulley(rotor.radius, cable.stiffness, cable.slack)

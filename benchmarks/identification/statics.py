@@ -1,6 +1,6 @@
 """Static force, hysteresis, damping and the regulator's paces from tables I3 and I2, in one fit.
 
-Protocol of I3: settled at P with no load; load ramped to L in 5 s, held 5 s, ramped back in 5 s.
+Load cycle of I3: settled at P with no load; load ramped to L in 5 s, held 5 s, ramped back in 5 s.
 At 10 s everything viscous has died out; at 15 s the muscle still contracts at the ramp's speed.
 With F(P, x) the static force, H and d force and distance of the hysteresis, z0 its memory where
 the trial begins (1: filled and contracted), B the damping:
@@ -11,7 +11,7 @@ the trial begins (1: filled and contracted), B the damping:
                    z2 = 1 - (1 - z1) exp(-(x2 - x1) / d)
 
 extension is x0 - x1, return is x2 - x1. All follow from the Bouc-Wen law along monotonic paths;
-a test holds them against the simulated protocol. Damping and the
+a test holds them against the simulated load cycle. Damping and the
 regulator's paces also make I2's transients (`transients`); neither table fixes them alone.
 """
 
@@ -54,16 +54,16 @@ STEP_WEIGHT = 4.0
 """Weight of a logarithmic residual of I2 (scatter 0.22) against a millimetre of I3."""
 
 
-class Protocol(NamedTuple):
-    """What I3's protocol gives, arrays of shape (n,) in m: x0, x0 - x1 and x2 - x1."""
+class LoadCycleReadings(NamedTuple):
+    """What I3's load cycle gives, arrays of shape (n,) in m: x0, x0 - x1 and x2 - x1."""
 
     no_load: np.ndarray
     extension: np.ndarray
     returned: np.ndarray
 
 
-def protocol(model: Model, pressure: np.ndarray, load: np.ndarray) -> Protocol:
-    """What a model predicts for I3's protocol.
+def load_cycle(model: Model, pressure: np.ndarray, load: np.ndarray) -> LoadCycleReadings:
+    """What a model predicts for I3's load cycle.
 
     Args:
         model: a station's model with hysteresis and damping.
@@ -94,15 +94,15 @@ def protocol(model: Model, pressure: np.ndarray, load: np.ndarray) -> Protocol:
         return force(p, x) - hysteresis.force * state - damping * speed
 
     x2 = contraction_at(unloaded, pressure, np.zeros_like(load))
-    return Protocol(x0, x0 - x1, x2 - x1)
+    return LoadCycleReadings(x0, x0 - x1, x2 - x1)
 
 
-Predict = Callable[[Model, np.ndarray, np.ndarray], Protocol]
-"""What predicts I3's protocol from model, pressures (Pa) and loads (N)."""
+Predict = Callable[[Model, np.ndarray, np.ndarray], LoadCycleReadings]
+"""What predicts I3's load cycle from model, pressures (Pa) and loads (N)."""
 
 
 def residuals(
-    model: Model, data: StationLimits, predict: Predict = protocol
+    model: Model, data: StationLimits, predict: Predict = load_cycle
 ) -> dict[str, np.ndarray]:
     """Predicted less measured: no_load, extension, returned (mm), each of shape (rows,)."""
     predicted = predict(model, data.pressure, data.load)
@@ -114,7 +114,7 @@ def residuals(
 
 
 def weighted(
-    model: Model, data: StationLimits, steps: PressureSteps, predict: Predict = protocol
+    model: Model, data: StationLimits, steps: PressureSteps, predict: Predict = load_cycle
 ) -> np.ndarray:
     """What a fit lowers: residuals of I3 (mm) and of I2, by their weights; those that are known."""
     parts = residuals(model, data, predict)
@@ -135,7 +135,7 @@ def fit(
     steps: PressureSteps,
     start: dict[str, float] | None = None,
     more: Mapping[str, tuple[float, float]] | None = None,
-    predict: Predict = protocol,
+    predict: Predict = load_cycle,
 ) -> Model:
     """The model with static force, hysteresis, damping and the regulator's paces fitted.
 
@@ -145,7 +145,7 @@ def fit(
         steps: rows of I2.
         start: values to start from, by parameter; `PARAMETERS` has the default.
         more: parameters that are fitted beside `PARAMETERS`, as these.
-        predict: predicts I3's protocol.
+        predict: predicts I3's load cycle.
     """
     fitted = {**PARAMETERS, **(more or {})}
     names = list(fitted)

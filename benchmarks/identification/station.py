@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from benchmarks.identification import lines, statics
-from benchmarks.identification.creep import CREEP, HELD, protocol_with_creep
+from benchmarks.identification.creep import CREEP, HELD, load_cycle_with_creep
 from benchmarks.identification.measurements import StationLimits
 from benchmarks.identification.transients import PressureSteps
 from pma_gym.effects import CATALOGUE
@@ -64,7 +64,7 @@ def identify(
     if not creeps:
         return statics.fit(model, data, steps, start)
     model = model.with_effects({"creep": {path.partition(".")[2]: v for path, v in HELD.items()}})
-    return statics.fit(model, data, steps, start, CREEP, protocol_with_creep)
+    return statics.fit(model, data, steps, start, CREEP, load_cycle_with_creep)
 
 
 def cable_damping(model: Model) -> float:

@@ -1,4 +1,4 @@
-"""Regulator and damping from table I2's pressure steps, through the simulated protocol.
+"""Regulator and damping from table I2's pressure steps, each of them simulated.
 
 I2 prints a damping B for every step: the dissertation fitted x = dX (1 - exp(-K t / B)) to each
 contraction, and the falling exponential to each relaxation, as if the pressure stepped at once. The

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 from benchmarks.measured.held_out import Rig
 from pma_gym.data.datasets.dataset import Dataset
 from pma_gym.discovery.experiments.detectability import experiment_to_detect
-from pma_gym.discovery.screening.score_test import Baseline, ScreeningScore, screen
+from pma_gym.discovery.screening.probe_scores import Baseline
+from pma_gym.discovery.screening.score_test import ScreeningScore, screen
 from pma_gym.effects import CATALOGUE
 from pma_gym.plant.model import Model
 
@@ -36,12 +37,12 @@ class Proposal:
     """An experiment.
 
     Attributes:
-        protocol: in words.
+        excitation: in words.
         shows: effects that it would show at their usual size.
         minutes: how long it takes.
     """
 
-    protocol: str
+    excitation: str
     shows: tuple[str, ...]
     minutes: float
 
@@ -59,7 +60,7 @@ def undecidable(
         model: the amended model.
         data: the trials.
         threads: how many simulate.
-        seed: of what is random in protocols.
+        seed: of what is random in excitations.
         progress: called with what is done and the total.
     """
     rig = Rig.of(data, model, threads)

@@ -243,7 +243,7 @@ class Summary:
                     np.sqrt(score.residual_mean_square) * unit,
                 ]
                 pressures += 3 * [pressure]
-                rotation += 3 * [EVERY_TASK[task].protocol.followed.is_angle]
+                rotation += 3 * [EVERY_TASK[task].schedule.followed.is_angle]
         return cls(trials, tasks, np.array(pressures), np.array(rotation), np.array(figures))
 
     def residuals(self, whitened: WhitenedResiduals, at: Array) -> Array:

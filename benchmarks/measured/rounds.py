@@ -8,8 +8,9 @@ from benchmarks.files import write_text
 from benchmarks.measured.stages import Stages
 from benchmarks.runner.damaged_results import reason, say_damaged
 from pma_gym.data.datasets.dataset import Dataset
-from pma_gym.discovery.diagnosis import ADDED, Diagnosis
+from pma_gym.discovery.diagnosis import Diagnosis
 from pma_gym.discovery.fitting.journal import digest
+from pma_gym.discovery.result.candidate import ADDED
 from pma_gym.discovery.workflow import diagnose
 from pma_gym.plant.model import Model, dump_model, load_model
 
@@ -141,7 +142,7 @@ def round_of(diagnosis: Diagnosis, trials: int) -> Round:
         next_experiment=None
         if experiment is None
         else {
-            "protocol": experiment.excitation,
+            "excitation": experiment.excitation,
             "separates": list(experiment.separates),
             "expected_odds": experiment.expected_odds,
         },

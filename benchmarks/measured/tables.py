@@ -10,6 +10,7 @@ from benchmarks.measured.replays import PHASE_NAMES
 from benchmarks.measured.result import Measured
 from benchmarks.measured.reverse import GAIN, NOTHING, Explanation, alike
 from benchmarks.measured.rounds import Round
+from pma_gym.discovery.result.next_experiment import proposed_excitation
 from pma_gym.terminal import SafeConsole
 
 TARGET_MM = 1.0
@@ -185,11 +186,12 @@ def experiment_text(result: Measured) -> list[str]:
             why = f"tell {' and '.join(names)} apart"
             if len(names) == 1:
                 why = f"see whether {names[0]} is there"
-            words.append(f"Round {number} proposes, to {why}: {following['protocol']}.")
+            words.append(f"Round {number} proposes, to {why}: {proposed_excitation(following)}.")
     for number, each in enumerate(result.proposals, 1):
         shows = ", ".join(map(readable, each.shows))
         words.append(
-            f"Experiment {number} ({each.minutes:.2g} min): {each.protocol}. It would show {shows}."
+            f"Experiment {number} ({each.minutes:.2g} min): {each.excitation}. "
+            f"It would show {shows}."
         )
     return words
 

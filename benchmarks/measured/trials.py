@@ -1,4 +1,4 @@
-"""Tables I2 and I3 as trials: commands of known protocol, readings at a few instants.
+"""Tables I2 and I3 as trials: commands of known excitation, readings at a few instants.
 
 I3, a trial a row: settled at a pressure with no load; the motor's voltage rises for 5 s, holds for
 5 s, falls for 5 s. Contraction and rotation are read before the load, at 10 s and at 15 s, load and

@@ -17,7 +17,7 @@ from benchmarks.report.statistics import Draws, resample
 from benchmarks.runner.controller_spec import ControllerSpec
 from benchmarks.suites.suite import NOMINAL, Entry, Episode, FrozenSuite
 from controllers.design.designs import kind_of
-from pma_gym.data.protocol import PROTOCOLS
+from pma_gym.data.trial_schedule import SCHEDULES
 from pma_gym.tasks import EVERY_TASK, Task, named_task
 from pma_gym.units import SI_FACTORS
 
@@ -52,7 +52,7 @@ class Measure(NamedTuple):
         """Names of a task's phases that count."""
         if self.alone:
             return [self.alone]
-        names = [phase.name for phase in task_of(task).protocol.phases]
+        names = [phase.name for phase in task_of(task).schedule.phases]
         back = RETURN if _returns(task) else ""
         return [name for name in names if (name == back) == self.returning]
 
@@ -67,10 +67,10 @@ class Measure(NamedTuple):
     def of_row(self, row: Row) -> float:
         """The error in a row: root mean square over the samples of the phases that count."""
         task = row["task"]
-        protocol = task_of(task).protocol
+        schedule = task_of(task).schedule
         if row["failure"]:
-            return self.scale(task) * protocol.span / SI_FACTORS[protocol.unit]
-        counted = [phase for phase in protocol.phases if phase.name in self.phases(task)]
+            return self.scale(task) * schedule.span / SI_FACTORS[schedule.unit]
+        counted = [phase for phase in schedule.phases if phase.name in self.phases(task)]
         squares = [phase.samples * row["phases"][phase.name]["rmse"] ** 2 for phase in counted]
         return self.scale(task) * math.sqrt(sum(squares) / sum(p.samples for p in counted))
 
@@ -89,8 +89,8 @@ def task_of(name: str) -> Task:
 
 def percent_of(task: str) -> float:
     """Percent of a task's range by mm or deg."""
-    protocol = task_of(task).protocol
-    return 100.0 * SI_FACTORS[protocol.unit] / protocol.span
+    schedule = task_of(task).schedule
+    return 100.0 * SI_FACTORS[schedule.unit] / schedule.span
 
 
 def measures(tasks: Iterable[str]) -> list[Measure]:
@@ -103,10 +103,10 @@ def measures(tasks: Iterable[str]) -> list[Measure]:
     groups: dict[tuple[str, bool], list[str]] = {}
     for task in tasks:
         kind = kind_of(task_of(task))
-        groups.setdefault((kind, kind in PROTOCOLS and task not in PROTOCOLS), []).append(task)
+        groups.setdefault((kind, kind in SCHEDULES and task not in SCHEDULES), []).append(task)
     every = []
     for (kind, unseen), names in groups.items():
-        title, unit = f"unseen {kind}" if unseen else kind, task_of(names[0]).protocol.unit
+        title, unit = f"unseen {kind}" if unseen else kind, task_of(names[0]).schedule.unit
         returning = tuple(name for name in names if _returns(name))
         there = Measure(title, tuple(names), unit)
         if returning:
@@ -116,7 +116,7 @@ def measures(tasks: Iterable[str]) -> list[Measure]:
         else:
             every.append(there)
         if kind == "isokinetic":
-            phases = [phase.name for phase in task_of(names[0]).protocol.phases]
+            phases = [phase.name for phase in task_of(names[0]).schedule.phases]
             every += [there._replace(name=f"{title} {name}", alone=name) for name in phases]
     return every
 
@@ -129,7 +129,7 @@ def pooled_measure(tasks: Iterable[str]) -> Measure:
 def _returns(name: str) -> bool:
     """Whether a task has a phase in which the motor goes back."""
     task = task_of(name)
-    return task.actuator == "motor" and any(p.name == RETURN for p in task.protocol.phases)
+    return task.actuator == "motor" and any(p.name == RETURN for p in task.schedule.phases)
 
 
 @dataclass(frozen=True)

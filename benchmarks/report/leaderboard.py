@@ -65,7 +65,7 @@ class Leaderboard:
         """Standings in every single task, phase III left out, where measures hold several."""
         if all(len(each.tasks) == 1 for each in measures(self.suite.tasks)):
             return {}
-        single = [Measure(t, (t,), task_of(t).protocol.unit) for t in self.suite.tasks]
+        single = [Measure(t, (t,), task_of(t).schedule.unit) for t in self.suite.tasks]
         standings = {measure.name: self.standings_of(measure) for measure in single}
         return {name: each for name, each in standings.items() if each.errors.values.size}
 

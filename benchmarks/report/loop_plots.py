@@ -88,7 +88,7 @@ def _margin_cells(condition: Condition, mine: Sequence[Loop]) -> list[str]:
 
 def loop_plot(conditions: Sequence[Condition], styles: Mapping[str, Style]) -> bytes:
     """Bode plots and step responses: a column a pressure."""
-    unit = conditions[0].station.task.protocol.unit
+    unit = conditions[0].station.task.schedule.unit
     with picture(COLUMN_IN * len(conditions) + AXIS_IN, 11.2) as canvas:
         axes: Any = canvas.subplots(4, len(conditions), sharex="row", sharey="row", squeeze=False)
         for column, condition in zip(axes.T, conditions, strict=True):
@@ -137,7 +137,7 @@ def _draw(axes: Any, loop: Loop, station: StationInfo, style: Style) -> None:  #
     axes[2].plot(*reference_step(loop, STEP_S), **line)
     times, position = load_step(loop, STEP_S)
     volts = LOAD_N / station.model.parameters["drive"].gain
-    axes[3].plot(times, position * volts / SI_FACTORS[station.task.protocol.unit], **line)
+    axes[3].plot(times, position * volts / SI_FACTORS[station.task.schedule.unit], **line)
 
 
 def _phase(response: np.ndarray) -> np.ndarray:

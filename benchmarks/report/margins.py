@@ -125,7 +125,7 @@ def loops(
     for place in _different(linearised(station, shares)):
         plant, load = sampled(place, station), sampled(place, station, "motor")
         for each in linear:
-            law = each.linear(station, place.share * station.task.protocol.span)
+            law = each.linear(station, place.share * station.task.schedule.span)
             check_law(each.name, law, station.period)
             known = margins(plant, law)
             every.append(Loop(each.name, place.share, place.direction, plant, load, law, known))

@@ -85,6 +85,14 @@ def _opening(leaderboard: Leaderboard) -> list[Block]:
     return blocks + [Paragraph(note) for note in notes]
 
 
+def incomplete_counts(leaderboard: Leaderboard) -> str:
+    """Controllers that have some of their cases, each with how many of how many; may be empty."""
+    return ", ".join(
+        f"{leaderboard.labels[entry.spec.name]} ({done} of {wanted} cases)"
+        for entry, done, wanted in leaderboard.incomplete
+    )
+
+
 def _notes(leaderboard: Leaderboard) -> list[str]:
     """What the reader must know before the first figure: what is missing."""
     labels, notes = leaderboard.labels, []
@@ -92,13 +100,10 @@ def _notes(leaderboard: Leaderboard) -> list[str]:
         names = ", ".join(labels[entry.spec.name] for entry in leaderboard.missing)
         notes.append(f"**Not run: {names}.**")
     if leaderboard.incomplete:
-        counts = ", ".join(
-            f"{labels[entry.spec.name]} ({done} of {wanted} cases)"
-            for entry, done, wanted in leaderboard.incomplete
-        )
         notes.append(
-            f"**The journal is incomplete: {counts}.** Measures whose cases a controller has not "
-            "all run are shown without it; where nobody has, only the cases that all have."
+            f"**The journal is incomplete: {incomplete_counts(leaderboard)}.** Measures whose "
+            "cases a controller has not all run are shown without it; where nobody "
+            "has, only the cases that all have."
         )
     bounds = [labels[name] for name in labels if is_bound(name)]
     if bounds:

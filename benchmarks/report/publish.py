@@ -12,6 +12,7 @@ from benchmarks.executors.local import Background
 from benchmarks.files import write_bytes, write_text
 from benchmarks.report.leaderboard import Leaderboard, read_leaderboard
 from benchmarks.report.page import (
+    incomplete_counts,
     loop_pictures,
     page_blocks,
     score_pictures,
@@ -31,7 +32,7 @@ NUMBERS, PAIRS = "leaderboard.csv", "pairs.csv"
 PAGE, TEXT = "report.html", "report.md"
 
 
-def run_report(suite: FrozenSuite, results: Path, out: Path) -> tuple[Path, TextTable]:
+def run_report(suite: FrozenSuite, results: Path, out: Path) -> tuple[Path, TextTable, str]:
     """Read a run's results and write the page; says on stderr what it is at.
 
     Args:
@@ -39,14 +40,16 @@ def run_report(suite: FrozenSuite, results: Path, out: Path) -> tuple[Path, Text
         results: folder of the results.
         out: folder of the page; may be the same.
     Returns:
-        The page, and the ranks as a table for a terminal.
+        The page, the ranks as a table for a terminal, and which controllers are left out of a
+        measure because the run has not finished their cases (empty if none).
     Raises:
         SuiteError: there are no results of this suite and version.
     """
     with StepProgress() as progress:
         leaderboard = read_leaderboard(suite, results)
         page = write_leaderboard(leaderboard, out, progress)
-    return page, ranks_table(shown_standings(leaderboard, pooled=True), leaderboard.labels)
+    ranks = ranks_table(shown_standings(leaderboard, pooled=True), leaderboard.labels)
+    return page, ranks, incomplete_counts(leaderboard)
 
 
 def write_leaderboard(

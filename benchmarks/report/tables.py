@@ -49,13 +49,18 @@ def ranks_table(standings: Sequence[Standings], labels: Labels) -> TextTable:
     columns = [{row.name: row for row in each.rows} for each in standings]
     names = dict.fromkeys(name for column in columns for name in column)
     rows = [
-        [labels.get(name, name), *(_rank(column.get(name)) for column in columns)] for name in names
+        [labels.get(name, name), *(_rank(column.get(name), len(names)) for column in columns)]
+        for name in names
     ]
-    return TextTable("Interquartile mean, rank in brackets", header, rows)
+    ranked = ", rank in brackets" if len(names) > 1 else ""
+    return TextTable(f"Interquartile mean{ranked}", header, rows)
 
 
-def _rank(row: Standing | None) -> str:
-    return NONE if row is None else f"{figure(row.mean.estimate)} [{row.rank or 'bound'}]"
+def _rank(row: Standing | None, count: int) -> str:
+    if row is None:
+        return NONE
+    mean = figure(row.mean.estimate)
+    return f"{mean} [{row.rank or 'bound'}]" if count > 1 else mean
 
 
 def _standing_cells(row: Standing, labels: Labels, unit: str, bounded: bool) -> list[str]:

@@ -12,8 +12,8 @@ from benchmarks.reproduction.replay import QUANTITIES, all_replay_errors
 from benchmarks.reproduction.results import Results
 from benchmarks.reproduction.summary_plots import QUANTITY_LABELS
 from benchmarks.runner.phase_score import PHASES, UNITS, measured_score
-from pma_gym.data.protocol import PROTOCOLS
 from pma_gym.data.trial import Trial
+from pma_gym.data.trial_schedule import SCHEDULES
 from pma_gym.pages.interactive import InteractiveFigure, Trace
 from pma_gym.units import SI_FACTORS
 
@@ -83,19 +83,19 @@ def replay_figure(results: Results) -> InteractiveFigure:
 
 def _trial_traces(results: Results, task: str, pressure: float, points: int) -> Iterator[Trace]:
     """The three views of a pressure: the dissertation's lines, then every controller."""
-    protocol, unit = PROTOCOLS[task], UNITS[task]
+    schedule, unit = SCHEDULES[task], UNITS[task]
     views = [
         f"{quantity} at {pressure:g} kPa ({its_unit})"
         for quantity, its_unit in (("error", unit), (LABELS[task], unit), ("motor voltage", "V"))
     ]
-    grid = np.linspace(0.0, protocol.duration, 61)
-    ideal = protocol.reference(grid) / SI_FACTORS[unit]
+    grid = np.linspace(0.0, schedule.duration, 61)
+    ideal = schedule.reference(grid) / SI_FACTORS[unit]
     yield Trace("Ideal", grid.tolist(), np.zeros(grid.size).tolist(), view=views[0])
     yield Trace("Ideal", grid.tolist(), ideal.tolist(), view=views[1])
     lines = measured_lines(task, pressure)
     time = _joined([time for time, _ in lines])
     line = _joined([line for _, line in lines])
-    error = line - protocol.reference(time) / SI_FACTORS[unit]
+    error = line - schedule.reference(time) / SI_FACTORS[unit]
     yield Trace("Measured (lines)", time.tolist(), error.tolist(), _MEASURED, view=views[0])
     yield Trace("Measured (lines)", time.tolist(), line.tolist(), _MEASURED, view=views[1])
     styles = controller_styles(results.suite)
@@ -108,11 +108,11 @@ def _trial_traces(results: Results, task: str, pressure: float, points: int) -> 
 
 def _curves(trial: Trial, task: str, points: int) -> tuple[Values, Values, Values, Values]:
     """Time (s), error and position (file unit) and motor voltage (V) of a trial, thinned out."""
-    protocol = PROTOCOLS[task]
+    schedule = SCHEDULES[task]
     some = slice(None, None, ceil(trial.time.size / points))
     time, unit = trial.time[some], SI_FACTORS[UNITS[task]]
-    position = trial.truth[protocol.quantity][some] / unit
-    ideal = protocol.reference(time) / unit
+    position = trial.truth[schedule.quantity][some] / unit
+    ideal = schedule.reference(time) / unit
     return time, position - ideal, position, trial.commands["motor_voltage"][some]
 
 

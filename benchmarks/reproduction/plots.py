@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from benchmarks.report.plot_style import MEASURED, REFERENCE, Style, controller_styles
 from benchmarks.reproduction.results import Results
 from benchmarks.runner.phase_score import UNITS, measured_score
-from pma_gym.data.protocol import PROTOCOLS, Protocol
 from pma_gym.data.trial import Trial
+from pma_gym.data.trial_schedule import SCHEDULES, TrialSchedule
 from pma_gym.metrics import phase_times
 from pma_gym.pages.figures import legend_below, picture, png
 from pma_gym.units import SI_FACTORS
@@ -36,7 +36,7 @@ def tracking_plot(results: Results, task: str) -> bytes:
             panels[0].set_title(f"{pressure:g} kPa")
             _draw_measured(panels, task, pressure)
             for name, trial in results.trials(task, pressure).items():
-                _draw_trial(panels, trial, PROTOCOLS[task], styles[name])
+                _draw_trial(panels, trial, SCHEDULES[task], styles[name])
             panels[-1].set_xlabel("time (s)")
         axes[0, 0].set_ylabel(f"{LABELS[task]} ({unit})")
         axes[1, 0].set_ylabel(f"actual − ideal ({unit})")
@@ -54,18 +54,18 @@ def actual_against_ideal_plot(results: Results, task: str) -> bytes:
     pressures = pictured_pressures(results, task)
     styles = controller_styles(results.suite)
     unit = UNITS[task]
-    protocol = PROTOCOLS[task]
-    span = protocol.span / SI_FACTORS[unit]
+    schedule = SCHEDULES[task]
+    span = schedule.span / SI_FACTORS[unit]
     with picture(11.0, 4.6) as figure:
         axes: Any = figure.subplots(1, len(pressures), sharex=True, sharey=True, squeeze=False)
         for axis, pressure in zip(axes[0], pressures, strict=True):
             axis.set_title(f"{pressure:g} kPa")
             axis.plot([0.0, span], [0.0, span], zorder=4, **REFERENCE)
             for time, line in measured_lines(task, pressure):
-                axis.plot(protocol.reference(time) / SI_FACTORS[unit], line, zorder=1, **MEASURED)
+                axis.plot(schedule.reference(time) / SI_FACTORS[unit], line, zorder=1, **MEASURED)
             for name, trial in results.trials(task, pressure).items():
-                position = trial.truth[protocol.quantity] / SI_FACTORS[unit]
-                ideal = protocol.reference(trial.time) / SI_FACTORS[unit]
+                position = trial.truth[schedule.quantity] / SI_FACTORS[unit]
+                ideal = schedule.reference(trial.time) / SI_FACTORS[unit]
                 axis.plot(ideal, position, color=styles[name].color, zorder=2)
             axis.set_xlabel(f"ideal {LABELS[task]} ({unit})")
         axes[0, 0].set_ylabel(f"actual {LABELS[task]} ({unit})")
@@ -78,11 +78,13 @@ def pictured_pressures(results: Results, task: str) -> list[float]:
     return [p for p in results.suite.pictured_kpa[task] if results.trials(task, p)]
 
 
-def _draw_trial(panels: Sequence[Axes], trial: Trial, protocol: Protocol, style: Style) -> None:
+def _draw_trial(
+    panels: Sequence[Axes], trial: Trial, schedule: TrialSchedule, style: Style
+) -> None:
     response, error, enlarged, voltage = panels
-    unit, color = SI_FACTORS[protocol.unit], style.color
-    actual = trial.truth[protocol.quantity] / unit
-    difference = actual - protocol.reference(trial.time) / unit
+    unit, color = SI_FACTORS[schedule.unit], style.color
+    actual = trial.truth[schedule.quantity] / unit
+    difference = actual - schedule.reference(trial.time) / unit
     response.plot(trial.time, actual, color=color)
     error.plot(trial.time, difference, color=color)
     enlarged.plot(trial.time, difference, color=color, linewidth=0.9)
@@ -91,14 +93,14 @@ def _draw_trial(panels: Sequence[Axes], trial: Trial, protocol: Protocol, style:
 
 def _draw_measured(panels: Sequence[Axes], task: str, pressure: float) -> None:
     """The reference, and the lines of tables 21 and 27-29, which are all that is printed."""
-    protocol, unit = PROTOCOLS[task], SI_FACTORS[UNITS[task]]
-    grid = np.linspace(0.0, protocol.duration, 301)
-    panels[0].plot(grid, protocol.reference(grid) / unit, zorder=4, **REFERENCE)
+    schedule, unit = SCHEDULES[task], SI_FACTORS[UNITS[task]]
+    grid = np.linspace(0.0, schedule.duration, 301)
+    panels[0].plot(grid, schedule.reference(grid) / unit, zorder=4, **REFERENCE)
     for panel in panels[1:3]:
         panel.axhline(0.0, zorder=4, **REFERENCE)
     for time, line in measured_lines(task, pressure):
         panels[0].plot(time, line, zorder=1, **MEASURED)
-        panels[1].plot(time, line - protocol.reference(time) / unit, zorder=1, **MEASURED)
+        panels[1].plot(time, line - schedule.reference(time) / unit, zorder=1, **MEASURED)
 
 
 def measured_lines(
@@ -107,7 +109,7 @@ def measured_lines(
     """Times (s) and positions (unit) of the regression line of each phase."""
     lines = []
     own = phase_times()[:1921:8]
-    for phase in PROTOCOLS[task].phases:
+    for phase in SCHEDULES[task].phases:
         score = measured_score(task, phase.name, pressure)
         lines.append((phase.start + own, score.intercept + score.slope * own))
     return lines

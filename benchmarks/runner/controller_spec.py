@@ -14,7 +14,7 @@ from controllers.policies.policy_file import PolicyError, policy_pair
 from controllers.policy import POLICIES, Policy, ShippedPolicy, shipped_policies
 from pma_gym.cli.controller_source import ControllerSourceError, class_in_file
 
-PROTOCOL = Path(controllers.controller.__file__)
+CONTROLLER_INTERFACE = Path(controllers.controller.__file__)
 """File that says what a controller is."""
 
 POLICY_FILES = (".json", ".safetensors")
@@ -116,7 +116,7 @@ class ControllerSpec:
                 f"cannot make {self.source}: {factory.__name__}() raised "
                 f"{type(error).__name__}: {error}; {where}"
             ) from error
-        _check_protocol(self, controller)
+        _check_interface(self, controller)
         return controller
 
 
@@ -228,18 +228,18 @@ def _same_file(name: str, path: Path) -> bool:
     return Path(name).resolve() == path.resolve()
 
 
-def _check_protocol(spec: ControllerSpec, controller: object) -> None:
+def _check_interface(spec: ControllerSpec, controller: object) -> None:
     """Refuse an object that is no `controllers.controller.Controller`."""
     for method, arguments in (("reset", "(reference, station)"), ("act", "(observation, time)")):
         function = getattr(controller, method, None)
         if not callable(function):
             raise ControllerError(
                 f"{spec.source} has no method {method}{arguments}; a controller needs reset "
-                f"and act, see {PROTOCOL}"
+                f"and act, see {CONTROLLER_INTERFACE}"
             )
         try:
             inspect.signature(function).bind(None, None)
         except (TypeError, ValueError):
             raise ControllerError(
-                f"{spec.source}: {method} must take {arguments}, see {PROTOCOL}"
+                f"{spec.source}: {method} must take {arguments}, see {CONTROLLER_INTERFACE}"
             ) from None

@@ -137,16 +137,16 @@ def figures(task: Task, episode: Episode, period: float, limits: Any) -> Figures
     Raises:
         ValueError: the position does not reach the end of the task, or is not finite.
     """
-    errors = phase_errors(task.protocol, episode.position)
+    errors = phase_errors(task.schedule, episode.position)
     _check_whole(task, errors)
-    factor = SI_FACTORS[task.protocol.unit]
+    factor = SI_FACTORS[task.schedule.unit]
     whole = np.concatenate(list(errors.values()))
     start = round(START_S * SAMPLE_RATE_HZ)
     voltages = np.asarray(episode.voltages, dtype=np.float64)
     seconds = np.asarray(episode.act_seconds, dtype=np.float64)
     return Figures(
-        unit=task.protocol.unit,
-        phases={name: _phase(error, task.protocol.span, factor) for name, error in errors.items()},
+        unit=task.schedule.unit,
+        phases={name: _phase(error, task.schedule.span, factor) for name, error in errors.items()},
         rmse=rmse(whole) / factor,
         start_rmse=rmse(whole[:start]) / factor,
         steady_rmse=rmse(whole[start:]) / factor,
@@ -191,7 +191,7 @@ def _phase(error: NDArray[np.float64], span: float, factor: float) -> PhaseFigur
 
 def _check_whole(task: Task, errors: Mapping[str, NDArray[np.float64]]) -> None:
     """Refuse an episode that ended early: its figures would not be comparable."""
-    for phase in task.protocol.phases:
+    for phase in task.schedule.phases:
         got = errors[phase.name].size
         if got != phase.samples:
             raise ValueError(

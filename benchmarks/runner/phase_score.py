@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pma_gym.data.protocol import PROTOCOLS
 from pma_gym.data.serres2008 import load_table
 from pma_gym.data.trial import Trial
+from pma_gym.data.trial_schedule import SCHEDULES
 from pma_gym.metrics import PHASE_DURATION, Regression, line_error, percent_of_range
 from pma_gym.studies.evaluation import evaluate
 from pma_gym.studies.trials import TRIALS, measured_regression
@@ -14,11 +14,11 @@ from pma_gym.tasks import phase_errors
 from pma_gym.units import SI_FACTORS
 
 PHASES = {
-    task: tuple(phase.name for phase in protocol.phases) for task, protocol in PROTOCOLS.items()
+    task: tuple(phase.name for phase in schedule.phases) for task, schedule in SCHEDULES.items()
 }
 """Phases of each task, as the tables call them."""
 
-UNITS = {task: protocol.unit for task, protocol in PROTOCOLS.items()}
+UNITS = {task: schedule.unit for task, schedule in SCHEDULES.items()}
 """Unit of each task's position in file units."""
 
 
@@ -71,9 +71,9 @@ def score_trial(trial: Trial, task: str) -> dict[str, PhaseScore]:
     Raises:
         TrialError: the trial does not last to the task's end.
     """
-    protocol = PROTOCOLS[task]
-    unit = SI_FACTORS[protocol.unit]
-    errors = phase_errors(protocol, np.asarray(trial.truth[protocol.quantity]))
+    schedule = SCHEDULES[task]
+    unit = SI_FACTORS[schedule.unit]
+    errors = phase_errors(schedule, np.asarray(trial.truth[schedule.quantity]))
     return {
         row.phase.name: _figures(
             row.regression,
@@ -96,7 +96,7 @@ def measured_score(task: str, phase: str, pressure_kpa: float) -> PhaseScore:
     tables = next(trial for trial in TRIALS if trial.phase == phase)
     name, rmse_column, _ = tables.errors
     rmse = float(load_table(name).where(pressure_kpa=pressure_kpa)[rmse_column][0])
-    span = PROTOCOLS[task].span / SI_FACTORS[UNITS[task]]
+    span = SCHEDULES[task].span / SI_FACTORS[UNITS[task]]
     line = measured_regression(phase, pressure_kpa)
     return _figures(line, tables.ideal, rmse, percent_of_range(rmse, span), 1.0)
 

@@ -78,7 +78,7 @@ class Rollout:
                 "load": held[:, 2],
                 "pressure": held[:, 3],
             },
-            truth={self.task.protocol.quantity: self.position + self._zero},
+            truth={self.task.schedule.quantity: self.position + self._zero},
         )
 
     @property
@@ -90,7 +90,7 @@ class Rollout:
     @property
     def _zero(self) -> float:
         """What the position is counted from, as trials count it (m or rad)."""
-        return self.start if self.task.protocol.followed.shortens else 0.0
+        return self.start if self.task.schedule.followed.shortens else 0.0
 
 
 def make_environment(
@@ -171,7 +171,7 @@ class _Log:
 
     def rollout(self, environment: PMAEnv) -> Rollout:
         """All of it, at the episode's end."""
-        last = environment.task.protocol.phases[-1]
+        last = environment.task.schedule.phases[-1]
         truths = np.array(self.truths).T
         return Rollout(
             task=environment.task,

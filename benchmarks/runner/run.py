@@ -2,7 +2,8 @@
 
 import time
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -16,6 +17,7 @@ from benchmarks.runner.execution import PendingCases, compile_kernels, execute, 
 from benchmarks.runner.journal import JOURNAL
 from benchmarks.runner.provenance import check_folder, run_info, write_run, write_stations
 from benchmarks.suites.suite import Entry, FrozenSuite
+from pma_gym.cli.progress import StepProgress
 
 FAILED, INTERRUPTED = 1, 130
 """Exit codes."""
@@ -101,14 +103,35 @@ def _run(
     with console.status("drawing the stations, compiling their equations"):
         write_stations(out, todo.suite)
         compile_kernels(todo.suite)
-    with _progress(console) as progress:
+    with (
+        _progress(console) as progress,
+        plain_progress(console, len(rows), len(todo.cases)) as say,
+    ):
         advance = _bars(progress, todo, entries)
 
         def on_done(row: Row) -> None:
             rows.append(row)
             advance(row)
+            say(len(rows))
 
         return execute(todo, executor, out, on_done)
+
+
+@contextmanager
+def plain_progress(console: Console, done: int, total: int) -> Iterator[Callable[[int], None]]:
+    """Print how many cases are done, a line a minute, where no bar can be drawn.
+
+    Args:
+        console: where the bars go; on a terminal nothing is printed.
+        done: cases that were done before.
+        total: cases in all.
+    Yields:
+        What to call with the number of cases that are done.
+    """
+    with StepProgress() if not console.is_terminal else nullcontext() as progress:
+        show = progress or (lambda step, done, total: None)
+        show("running cases", done, total)
+        yield lambda count: show("running cases", count, total)
 
 
 def _greeting(todo: PendingCases, entries: Sequence[Entry], out: Path, jobs: int) -> str:
@@ -122,8 +145,9 @@ def _greeting(todo: PendingCases, entries: Sequence[Entry], out: Path, jobs: int
         words += f"\n{done} cases are done in {out / JOURNAL} and used again"
     if todo.outdated:
         words += (
-            f"\n{todo.outdated} rows there were made with other options, other code or another "
-            "file of these controllers; they stay there, are not used, and their cases run anew"
+            f"\n{todo.outdated} rows in {out / JOURNAL} were made with other options, other "
+            "code or another file of these controllers; they stay there, are not used, and their "
+            "cases run anew. The report in this folder is replaced; --out names another folder"
         )
     return words
 

@@ -93,10 +93,10 @@ def _falls_short(
     model: Model, task: Task, truth: dict[str, NDArray[np.float64]], start: float
 ) -> str:
     """Why a ramp does not reach the end of a task's range; empty if it does."""
-    quantity, unit = task.protocol.quantity, task.protocol.unit
-    position = truth[quantity] - (start if task.protocol.followed.shortens else 0.0)
-    there = int(np.argmax(position >= task.protocol.span))
-    if position[there] < task.protocol.span:
+    quantity, unit = task.schedule.quantity, task.schedule.unit
+    position = truth[quantity] - (start if task.schedule.followed.shortens else 0.0)
+    there = int(np.argmax(position >= task.schedule.span))
+    if position[there] < task.schedule.span:
         return f"it only reaches {position.max() / SI_FACTORS[unit]:.3g} {unit}"
     codes = broken(model.parameters["limits"], {n: v[: there + 1] for n, v in truth.items()})
     return limit_in_words(model, float(np.max(codes)))

@@ -109,7 +109,7 @@ class PilotedVecEnv(EngineVecEnv):
         self, i: int, entries: NDArray[np.float32], info: Mapping[str, Any], broken: bool
     ) -> dict[str, Any]:
         """Info of an environment whose episode ends; errors unless it was cut."""
-        name = f"rmse_by_phase_{self.envs.task.protocol.suffix}"
+        name = f"rmse_by_phase_{self.envs.task.schedule.suffix}"
         last: dict[str, Any] = {
             "terminal_observation": entries,
             "TimeLimit.truncated": not broken,

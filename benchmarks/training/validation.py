@@ -34,7 +34,7 @@ def measure_of(task: str) -> Measure:
     """The suites' first measure of a task; of an exercise all phases together."""
     named = task_of(task)
     if named.exercise is not None:
-        return Measure(named.title, (task,), named.protocol.unit)
+        return Measure(named.title, (task,), named.schedule.unit)
     return measures([task])[0]
 
 
@@ -67,7 +67,7 @@ def validate(model: Any, envs: VecEnv, task: str) -> Validation:  # noqa: ANN401
 
 def _row(task: str, info: dict[str, Any], failed: bool) -> dict[str, Any]:
     """An episode's end as a row of a suite's journal."""
-    suffix = task_of(task).protocol.suffix
+    suffix = task_of(task).schedule.suffix
     phases = {} if failed else info[f"rmse_by_phase_{suffix}"]
     return {
         "task": task,
@@ -78,6 +78,6 @@ def _row(task: str, info: dict[str, Any], failed: bool) -> dict[str, Any]:
 
 def unit_of(task: str) -> str:
     """Unit of a task's errors: mm, deg or N m."""
-    unit = task_of(task).protocol.unit
+    unit = task_of(task).schedule.unit
     assert unit in SI_FACTORS
     return unit

@@ -81,7 +81,7 @@ class _Trial:
             if broken:
                 return UNSTABLE_COST
         by_phase = info.get("rmse_by_phase_mm") or info["rmse_by_phase_deg"]
-        target = TARGETS[self.job.protocol.quantity] / SI_FACTORS[self.job.protocol.unit]
+        target = TARGETS[self.job.schedule.quantity] / SI_FACTORS[self.job.schedule.unit]
         variation = float(np.abs(np.diff(env.voltages)).sum()) / env.time
         return float(np.mean(list(by_phase.values()))) / target + (
             VARIATION_WEIGHT_S_PER_V * variation

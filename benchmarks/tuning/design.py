@@ -218,7 +218,7 @@ def _problems(controller: str, seed: int) -> Iterator[DesignProblem]:
 
 
 def _task_quantity(task: str) -> str:
-    return PMAEnv(task=task, pressure_kpa=300.0).task.protocol.quantity
+    return PMAEnv(task=task, pressure_kpa=300.0).task.schedule.quantity
 
 
 def design(problem: DesignProblem) -> DesignResult:
@@ -279,9 +279,9 @@ def trial_cost(done: Rollout) -> float:
     """What a trial costs; `FAILED` if a physical limit ended it."""
     if done.ended_by:
         return FAILED
-    protocol = done.task.protocol
-    target = (TARGETS | {"contraction": CONTRACTION_TARGET})[protocol.quantity]
-    errors = phase_errors(protocol, done.position).values()
+    schedule = done.task.schedule
+    target = (TARGETS | {"contraction": CONTRACTION_TARGET})[schedule.quantity]
+    errors = phase_errors(schedule, done.position).values()
     actuator = 1 if done.task.actuator == "regulator" else 0
     variation = float(np.abs(np.diff(done.commands[:, actuator])).sum())
     return float(np.mean([rmse(error) for error in errors])) / target + (

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from controllers.design.designs import loop_name, task_kind
 from controllers.pid import PID
-from pma_gym.data.protocol import Protocol
+from pma_gym.data.trial_schedule import TrialSchedule
 from pma_gym.envs import StationInfo
 from pma_gym.plant.model import Model
 from pma_gym.tasks import EVERY_TASK
@@ -53,12 +53,12 @@ class Job:
         return task_kind(self.station)
 
     @property
-    def protocol(self) -> Protocol:
-        """The task's protocol."""
-        return EVERY_TASK[self.task].protocol
+    def schedule(self) -> TrialSchedule:
+        """The task's schedule."""
+        return EVERY_TASK[self.task].schedule
 
     @property
     def start_factor(self) -> float:
         """`START_FACTOR` for a PID that brings the cable back to slack, else 1."""
-        slack = "cable" in self.model.parameters and self.protocol.followed.is_angle
+        slack = "cable" in self.model.parameters and self.schedule.followed.is_angle
         return START_FACTOR if slack and self.controller == PID.name else 1.0

@@ -46,7 +46,7 @@ def lambda_tuning(job: Job) -> np.ndarray:
     """k_p, k_i, k_d (SI), end factor and, for the PID alone, lead (s) to start from."""
     station = job.station
     (place, *_) = linearised(station, [0.5])
-    one = place.system[job.protocol.quantity, f"{station.task.actuator}_voltage"]
+    one = place.system[job.schedule.quantity, f"{station.task.actuator}_voltage"]
     period, delay = station.period, station.action_delay
     gain = float(np.real(one.dcgain()))
     # Area between the step response and its end over the gain: the sum of all time constants.

@@ -45,7 +45,7 @@ def linearised(station: StationInfo, shares: Iterable[float] = STROKES) -> list[
     plant, task = Plant(station.model), station.task
     moved_by_motor = task.actuator == "motor"
     # Of the dissertation's displacement only the way out is asked for.
-    both = ("relaxing", "contracting") if not task.protocol.followed.lengthens else ("relaxing",)
+    both = ("relaxing", "contracting") if not task.schedule.followed.lengthens else ("relaxing",)
     places = []
     for share in shares:
         try:
@@ -61,9 +61,9 @@ def _pulled(
     plant: Plant, station: StationInfo, share: float
 ) -> tuple[Condition, tuple[float, float]]:
     """The plant held by the motor at a share of the stroke, at the trial's pressure."""
-    protocol, parameters = station.task.protocol, station.model.parameters
-    stroke = share * protocol.span
-    if protocol.followed.is_angle:
+    schedule, parameters = station.task.schedule, station.model.parameters
+    stroke = share * schedule.span
+    if schedule.followed.is_angle:
         stroke *= parameters["rotor" if "rotor" in parameters else "servo"].radius
     zero = plant.settle(0.0, pressure=station.pressure).zero_contraction
     return operating_point(plant, station.pressure, zero - stroke)
@@ -83,7 +83,7 @@ def _contracted(
     def contraction(voltage: float) -> float:
         return float(plant.settle(motor, regulator_voltage=voltage).state[at])
 
-    wanted = contraction(first) + share * station.task.protocol.span
+    wanted = contraction(first) + share * station.task.schedule.span
 
     def off(voltage: float) -> float:
         return contraction(voltage) - wanted
@@ -105,7 +105,7 @@ def sampled(
         station: its task, sensors, period and delays.
         actuator: whose voltage; the task's if None.
     """
-    quantity = station.task.protocol.quantity
+    quantity = station.task.schedule.quantity
     one: Any = place.system[quantity, f"{actuator or station.task.actuator}_voltage"]
     sensor = station.model.parameters.get(SIGNALS[quantity].sensor)
     if sensor is not None:

@@ -167,7 +167,7 @@ def _interrupted(done: int, total: int, kept: Path, out: Path) -> str:
 def _all_tuned(rows: list[Job], jobs: int, kept: KeptRows) -> bool:
     """Tune rows and keep each as it is done; false after Ctrl-C."""
     # The longest trials first, so that no process waits at the end.
-    order = sorted(rows, key=lambda row: -row.protocol.duration * row.rate_hz)
+    order = sorted(rows, key=lambda row: -row.schedule.duration * row.rate_hz)
     try:
         if order:
             Plant(order[0].model)  # compiled here, once, so that the processes find it on disk
@@ -227,7 +227,7 @@ def _tables(jobs: list[Job], results: list[tuple[Gains, float]]) -> dict[str, An
     for job, (gains, cost) in zip(jobs, results, strict=True):
         kinds = tables.setdefault(job.loop, {}).setdefault(job.kind, {})
         table = kinds.setdefault(job.controller, {})
-        columns = column_names(job.protocol.unit)
+        columns = column_names(job.schedule.unit)
         row = {"pressure_kpa": job.pressure_kpa} | {
             name: float(f"{getattr(gains, field) / factor:.4g}")
             for field, (name, factor) in columns.items()

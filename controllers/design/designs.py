@@ -73,7 +73,7 @@ def kind_of(task: Task) -> str:
     """`displacement`, `rotation` or `contraction`; of an exercise `isokinetic` or `moment`."""
     if task.exercise is not None:
         return EXERCISE_KINDS[0 if task.exercise.prescription is None else 1]
-    return KINDS[task.protocol.quantity]
+    return KINDS[task.schedule.quantity]
 
 
 def must_give_a_position(station: StationInfo) -> None:

@@ -114,7 +114,7 @@ def scheduled_gains(controller: str, station: StationInfo, path: Path = GAINS_FI
             f"{model.plant}; tune them: python -m benchmarks tune --model {name}"
         )
     table = loops[nearest_loop(loop_name(station), known)][kind][controller]
-    columns = column_names(_unit(task.protocol.quantity))
+    columns = column_names(_unit(task.schedule.quantity))
     pressures = np.array(table["pressure_kpa"]) * 1e3
     return Gains(
         *(

@@ -86,7 +86,7 @@ class StationInverse:
     def along(self, wanted: np.ndarray, station: StationInfo) -> np.ndarray:
         """Motor voltage (V) of every control period of a motion, shape (steps,)."""
         parts = self.parts(station.period)
-        rotation = station.task.protocol.followed.is_angle
+        rotation = station.task.schedule.followed.is_angle
         tension, extension = self.follow(wanted, station.period / parts, station.pressure, rotation)
         wound = self.rotor.radius * wanted if rotation else extension
         load = self._mean_load(tension, extension, wound, station.period, parts)
@@ -189,7 +189,7 @@ class CascadeInverse:
     def along(self, wanted: np.ndarray, station: StationInfo) -> np.ndarray:
         """Motor voltage (V) of every control period of a motion, from its middle."""
         ends, middle = wanted[::2], wanted[1::2]
-        if station.task.protocol.followed.is_angle:
+        if station.task.schedule.followed.is_angle:
             return self._mapped(self.parameters["servo"].radius * middle, station.pressure)
         rate = np.diff(ends) / station.period
         # The muscle relaxes where the motor is ahead of it, as where y rises.

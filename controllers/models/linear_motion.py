@@ -102,7 +102,7 @@ def linear_motion(
     )
     truth = plant.observe(states, zero)
     start = truth["contraction"][0]
-    position = truth[task.protocol.quantity] - (start if task.load else 0.0)
+    position = truth[task.schedule.quantity] - (start if task.load else 0.0)
     error = np.append(position[: len(wanted)] - wanted, np.zeros(beyond))
     readings = plant.lagged(states, truth)
     readings[:, 0] = start - readings[:, 0]
@@ -131,7 +131,7 @@ def linear_motion(
         damped,
         middle[:, kept[damped]] if damped is not None else np.zeros(len(volts)),
         states[:, kept],
-        seen[task.protocol.quantity],
+        seen[task.schedule.quantity],
         tuple(names),
         _sensors(plant, kept, seen),
         len(needed),

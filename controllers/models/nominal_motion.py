@@ -44,7 +44,7 @@ class NominalMotion:
         self._volts: list[float] = volts.tolist()
         self._planned: list[float] = planned.tolist()
         self._nodes_per_s = (len(planned) - 1) / (len(volts) * station.period)
-        self.sensor_lag, self.noise = sensor_of(station, station.task.protocol.quantity)
+        self.sensor_lag, self.noise = sensor_of(station, station.task.schedule.quantity)
 
     def voltage(self, time: float) -> float:
         """Voltage (V) that should be in force in the period that begins at a time (s).
@@ -137,7 +137,7 @@ def nominal_motion(reference: Reference, station: StationInfo) -> NominalMotion:
     """
     must_give_a_position(station)
     inverse = _inverse(ModelKey(station.model), station.task.actuator)
-    parts, span = inverse.parts(station.period), station.task.protocol.span
+    parts, span = inverse.parts(station.period), station.task.schedule.span
     step, first = station.period / parts, round(parts * station.action_delay / station.period)
     planned = begun_late(_sampled(reference, station, parts), first)
     if len(jumps(planned, span)):
@@ -155,7 +155,7 @@ def _sampled(reference: Reference, station: StationInfo, parts: int) -> np.ndarr
     """
     count = station.task.steps(1.0 / station.period) * parts + 1
     times = np.arange(count) * station.period / parts
-    own = np.asarray(station.task.protocol.reference(times))
+    own = np.asarray(station.task.schedule.reference(times))
     instants = [reference(time) for time in times[::parts].tolist()]
     if np.array_equal(own[::parts], instants):
         return own
@@ -167,7 +167,7 @@ class _Aim:
 
     def __init__(self, planned: np.ndarray, station: StationInfo) -> None:
         self.planned, self.station, task = planned, station, station.task
-        said = task.protocol.quantity, task.load, station.pressure
+        said = task.schedule.quantity, task.load, station.pressure
         self._key = *said, station.period, station.action_delay, planned.tobytes()
 
     def __hash__(self) -> int:
@@ -187,7 +187,7 @@ def _voltages(inverse: Inverse, aim: _Aim) -> np.ndarray:
     station, planned = aim.station, aim.planned
     volts = inverse.along(planned, station)
     parts = (len(planned) - 1) // len(volts)
-    lag, _ = sensor_of(station, station.task.protocol.quantity)
+    lag, _ = sensor_of(station, station.task.schedule.quantity)
     instants = station.period * np.arange(len(volts) + 1)
     nodes = station.period / parts * np.arange(len(planned))
     wanted = np.interp(instants - lag, nodes, planned)

@@ -49,7 +49,7 @@ def nominal_rollout(station: StationInfo, volts: np.ndarray) -> np.ndarray:
 def position_of(station: StationInfo, said: np.ndarray) -> np.ndarray:
     """The task's position (m or rad), shape (n,), from the result of `nominal_rollout`."""
     contraction, rotation, _ = said
-    quantity = station.task.protocol.quantity
+    quantity = station.task.schedule.quantity
     return {"extension": -contraction, "rotation": rotation, "contraction": contraction}[quantity]
 
 

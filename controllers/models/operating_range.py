@@ -29,10 +29,10 @@ def stroke_along(positions: np.ndarray, station: StationInfo) -> Stroke:
     directions = ("relaxing",) * relaxes + ("contracting",) * contracts
     return _stroke(
         ModelKey(station.model),
-        *(task.protocol.quantity, task.actuator),
+        *(task.schedule.quantity, task.actuator),
         rest_voltages(station),
         station.period,
-        (min(float(positions.min()), 0.0), max(float(positions.max()), task.protocol.span)),
+        (min(float(positions.min()), 0.0), max(float(positions.max()), task.schedule.span)),
         directions or ("relaxing",),
     )
 

@@ -107,7 +107,7 @@ def bank_design(
         jolt: standard deviation of a force at the slide that lasts a period (N).
     """
     step, command, drift, force = _sampled(motion, station)
-    rotates = station.task.protocol.followed.is_angle
+    rotates = station.task.schedule.followed.is_angle
     radius = getattr(station.model.parameters.get("rotor"), "radius", 1.0)
     seen = np.concatenate([motion.sensors, np.zeros((3, len(UNKNOWNS)))], axis=1)
     # The sensor that the task does not ask for is off by the gap.

@@ -66,6 +66,6 @@ class ObserverFeedback(ABC, Generic[Settings]):
     def linear(self, station: StationInfo, position: float) -> "control.StateSpace":
         """The feedback near a position (m or rad) where it is linear: volts by error."""
         made = type(self)(self._given)
-        made._design(nominal_motion(station.task.protocol.at, station))
+        made._design(nominal_motion(station.task.schedule.at, station))
         at = made._observer.nearest(position)
         return made._observer.linear(at, made._gains(at))

@@ -48,7 +48,7 @@ class BatchPolicyAdapter:
         lowest = station(station(0.0).task.lowest_pressure)
         self._task, self._period = lowest.task, lowest.period
         self._scales = scales_of(lowest)
-        self._references = steps_of(lowest.task.protocol.at, lowest, view.preview)
+        self._references = steps_of(lowest.task.schedule.at, lowest, view.preview)
         self._ahead = ahead(self._references, view.preview, self._scales)
         self._late = round(lowest.observation_delay / lowest.period)
         self._last = len(self._ahead) - 1
@@ -78,7 +78,7 @@ class BatchPolicyAdapter:
             station = self._station(pressure)
             self._volts[i] = rest_voltage(station)
             if self._bases:
-                self._bases[i].reset(self._task.protocol.at, station)
+                self._bases[i].reset(self._task.schedule.at, station)
 
     def update(
         self, readings: NDArray[np.float64], which: NDArray[np.int64] | None = None

@@ -81,9 +81,9 @@ class ObservationSpec:
         """
         if self.kind == "environment":
             return self.table(station).rows
-        protocol = station.task.protocol
-        span = share_of(protocol, 1.0)
-        fine = share_of(protocol, FINE_SHARE)
+        schedule = station.task.schedule
+        span = share_of(schedule, 1.0)
+        fine = share_of(schedule, FINE_SHARE)
         rows = [
             ("reference now", span),
             ("pressure at the trial's start less 362.5 kPa", "212.5 kPa"),

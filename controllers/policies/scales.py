@@ -2,8 +2,8 @@
 
 from typing import Any
 
-from pma_gym.data.protocol import Protocol
 from pma_gym.data.signals import SIGNALS
+from pma_gym.data.trial_schedule import TrialSchedule
 from pma_gym.engine.observation import ROTATION_SCALE, Prescribed
 from pma_gym.envs import StationInfo
 from pma_gym.tasks import Task
@@ -47,9 +47,9 @@ class Scales:
                 f"a tracking view needs the model of a station, with its drive and pulley; got "
                 f"{station.model.name}, a {station.model.plant}: take station or serres2008"
             )
-        protocol = station.task.protocol
-        self.span, self.fine = protocol.span, FINE_SHARE * protocol.span
-        self.quantity = protocol.quantity
+        schedule = station.task.schedule
+        self.span, self.fine = schedule.span, FINE_SHARE * schedule.span
+        self.quantity = schedule.quantity
         self.radius = parameters["rotor"].radius
         self.delay = round((station.action_delay + station.observation_delay) / station.period)
         self._gain, self._offset = parameters["drive"].gain, parameters["drive"].offset
@@ -118,7 +118,7 @@ def scales_of(station: StationInfo) -> Scales:
 
 def delayed_rows(task: Task) -> list[tuple[str, str]]:
     """Names of the four entries of a reading, and what 1.0 stands for, in order."""
-    error, fine = "reference less measured position", share_of(task.protocol, FINE_SHARE)
+    error, fine = "reference less measured position", share_of(task.schedule, FINE_SHARE)
     change, other = (
         "pressure less pressure at the trial's start",
         "reference less position by the other sensor",
@@ -126,17 +126,17 @@ def delayed_rows(task: Task) -> list[tuple[str, str]]:
     if task.exercise is None:
         load = "load less what the nominal drive is asked for"
         return [(error, fine), (other, fine), (change, "20 kPa"), (load, "50 N")]
-    coarse, rest = share_of(task.protocol, COARSE_SHARE), [(change, "100 kPa"), ("load", "200 N")]
+    coarse, rest = share_of(task.schedule, COARSE_SHARE), [(change, "100 kPa"), ("load", "200 N")]
     if task.exercise.prescription is None:
         return [(error, coarse), (other, fine), *rest]
     return [("prescribed less measured moment", coarse), ("measured rotation", "90 deg"), *rest]
 
 
-def share_of(protocol: Protocol, share: float) -> str:
+def share_of(schedule: TrialSchedule, share: float) -> str:
     """A share of a task's range in words.
 
     >>> from pma_gym.tasks import TASKS
-    >>> share_of(TASKS["rotation"].protocol, 0.01)
+    >>> share_of(TASKS["rotation"].schedule, 0.01)
     '0.9 deg'
     """
-    return f"{share * protocol.span / SI_FACTORS[protocol.unit]:g} {protocol.unit}"
+    return f"{share * schedule.span / SI_FACTORS[schedule.unit]:g} {schedule.unit}"

@@ -19,7 +19,7 @@ class Integral:
         self.volts = 0.0
 
     def act(self, measurement: Measurement, time: float) -> float:
-        """Motor voltage (V) for the next control period."""
+        """Motor voltage (V) for the next control period; extension in m, rotation in rad."""
         measured = measurement.rotation if self.rotation else measurement.extension
         self.volts += self.gain * self.period * (self.reference(time) - measured)
         self.volts = min(max(self.volts, 0.0), 10.0)

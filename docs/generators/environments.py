@@ -60,16 +60,16 @@ def tasks() -> str:
     """All tasks: who moves, what follows, how long, at which pressures and loads."""
     rows = []
     for name, task in EVERY_TASK.items():
-        protocol = task.protocol
+        schedule = task.schedule
         low, high = (f"{pressure / 1e3:g}" for pressure in task.starts)
         rows.append(
             [
                 code(name),
                 task.actuator,
-                protocol.quantity,
-                f"{protocol.span / SI_FACTORS[protocol.unit]:g} {protocol.unit}",
-                f"{protocol.duration:g} s",
-                ", ".join(phase.name for phase in protocol.phases),
+                schedule.quantity,
+                f"{schedule.span / SI_FACTORS[schedule.unit]:g} {schedule.unit}",
+                f"{schedule.duration:g} s",
+                ", ".join(phase.name for phase in schedule.phases),
                 low if low == high else f"{low}-{high}",
                 f"{task.load:g} N" if task.load else "",
             ]

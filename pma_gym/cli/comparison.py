@@ -1,4 +1,4 @@
-"""`pma-gym compare`: how far a model is from a lab's logs, without fitting anything."""
+"""`pma-gym compare`: misfit of a model to a lab's logs, without a fit."""
 
 from pathlib import Path
 from typing import Annotated
@@ -37,7 +37,7 @@ def compare(
     from pma_gym.discovery.fitting.trial_states import misfits, read_states
     from pma_gym.discovery.preparation.data_checks.checking import check_dataset
     from pma_gym.discovery.preparation.prepared_trials import prepared
-    from pma_gym.discovery.report.text import figure, signal_name, signal_unit
+    from pma_gym.discovery.report.figure_text import figure, signal_name, signal_unit
 
     with warnings_said():
         data = read_dataset(dataset)

@@ -1,4 +1,4 @@
-"""A controller that a command line names: a class in a file, or in a module."""
+"""Controllers named on a command line: a class in a file or a module."""
 
 import importlib
 import importlib.util
@@ -11,11 +11,11 @@ from pma_gym.envs import Measurement, Reference, StationInfo
 
 
 class ControllerSourceError(ValueError):
-    """A controller that cannot be made; the message says why and how to fix it."""
+    """A controller cannot be created; the message has the reason and the fix."""
 
 
 class Runnable(Protocol):
-    """What drives a trial; see `controllers.controller` in a clone."""
+    """Interface of a controller; see `controllers.controller` in a clone."""
 
     def reset(self, reference: Reference, station: StationInfo) -> None:
         """Prepare for a trial."""
@@ -27,12 +27,12 @@ class Runnable(Protocol):
 
 
 def controller_of(source: str) -> Runnable:
-    """The controller of `file.py:Class` or `module:Class`, made without arguments.
+    """Create the controller of `file.py:Class` or `module:Class`, without arguments.
 
-    The file or module is run: name none that you do not trust.
+    This executes the file or module, so name only one that you trust.
 
     Raises:
-        ControllerSourceError: what is missing, or what its own code raised.
+        ControllerSourceError: the file, module or class is missing, or its code raised an error.
     """
     place, _, name = source.rpartition(":")
     if not place or not name.isidentifier():
@@ -60,11 +60,10 @@ def controller_of(source: str) -> Runnable:
 
 
 def class_in_file(path: Path, name: str) -> type:
-    """A class of a file, which is run once in each process.
+    """Return a class of a file, which is executed once in each process.
 
     Raises:
-        ControllerSourceError: the file or the class is missing; or the file raised something, which
-            is the cause.
+        ControllerSourceError: the file or the class is missing, or the file raised an error.
     """
     return _class_of(_from_file(path), str(path), name)
 

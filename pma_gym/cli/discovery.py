@@ -36,7 +36,7 @@ _FITTED = (
     "not_identifiable",
     "warnings",
 )
-"""What `fit.json` has of a diagnosis."""
+"""Fields of a diagnosis that `fit.json` contains."""
 
 DatasetArgument = Annotated[
     Path,

@@ -1,4 +1,4 @@
-"""Films of pictures: GIF by Pillow, which matplotlib brings along, and MP4 by imageio-ffmpeg."""
+"""Films from pictures: GIF by Pillow, a dependency of matplotlib, and MP4 by imageio-ffmpeg."""
 
 import importlib
 import io
@@ -12,18 +12,18 @@ from PIL import Image
 from pma_gym.files import OutputError, replace_file
 
 FILMS = (".mp4", ".gif")
-"""Endings of films."""
+"""File name extensions of films."""
 
 
 def write_film(path: Path, frames: Sequence[np.ndarray], rate_hz: float) -> None:
-    """Write a film, whole or not at all.
+    """Write a film to a file, completely or not at all.
 
     Args:
         path: file, ending in one of `FILMS`.
         frames: RGB of one shape (height, width, 3), uint8.
         rate_hz: pictures a second (Hz).
     Raises:
-        OutputError: an MP4 without imageio-ffmpeg; says what installs it.
+        OutputError: an MP4 without imageio-ffmpeg; with the command to install it.
     """
     made = _gif if path.suffix.lower() == ".gif" else _mp4
     replace_file(path, made(frames, rate_hz))

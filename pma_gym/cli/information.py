@@ -1,4 +1,4 @@
-"""What is installed, and what a model holds, as tables on a terminal."""
+"""Tables of the installation and of a model, for the terminal."""
 
 import platform
 from importlib import metadata
@@ -16,7 +16,7 @@ _PACKAGES = ("pma-gym", "gymnasium", "numpy", "scipy", "llvmlite", "control")
 
 
 def print_version(wanted: bool) -> None:
-    """Print the version and end, if it is wanted: what `--version` does."""
+    """Print the version and exit, for `--version`."""
     if wanted:
         print(f"pma-gym {__version__}")
         raise typer.Exit
@@ -34,7 +34,7 @@ def installation() -> dict[str, Any]:
 
 
 def model_document(model: Model) -> dict[str, Any]:
-    """A model's effects and parameters, in the units of files."""
+    """Return a model's effects and parameters, in file units."""
     rows = [row._asdict() for row in model.rows()]
     head = {"name": model.name, "plant": model.plant, "title": model.title}
     return head | {"parameters": rows}
@@ -57,7 +57,7 @@ def print_installation(console: Console) -> None:
 
 
 def print_model(model: Model, console: Console) -> None:
-    """A model's effects and parameters: value, 95 % interval, unit and source."""
+    """Print a model's effects and parameters: value, 95 % interval, unit and source."""
     console.print(f"{model.name} ({model.plant}): {model.title}", highlight=False, markup=False)
     table = Table("effect", "parameter")
     for name in ("value", "95 % interval"):

@@ -1,4 +1,4 @@
-"""Command lines as people expect them: strict numbers, and the nearest option to a misspelt one."""
+"""Command line parsing: strict numbers, and the nearest option to a misspelt one."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -15,13 +15,13 @@ JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON instead of 
 
 
 class StrictTyper(typer.Typer):
-    """An application whose options read numbers as files do: no `nan`, no `1_000`, no `٣`."""
+    """Typer application with numbers parsed as in files: no `nan`, no `1_000`, no `٣`."""
 
     def __init__(self, **options: Any) -> None:
         super().__init__(**{"cls": _StrictGroup, **options})
 
     def command(self, *names: Any, **options: Any) -> Callable[..., Any]:
-        """As Typer's, with strict numbers."""
+        """Typer's decorator, with strict numbers."""
         return super().command(*names, **{"cls": _StrictCommand, **options})
 
 

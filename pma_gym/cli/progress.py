@@ -1,4 +1,4 @@
-"""Progress by step, beside the results: a bar where somebody watches, a line a step elsewhere."""
+"""Progress by step on stderr: a bar on a terminal, a line per step elsewhere."""
 
 import sys
 import time
@@ -21,18 +21,18 @@ from pma_gym.cli.time_left import TimeLeft
 from pma_gym.terminal import SafeConsole
 
 PAUSE_S = 60.0
-"""Between two lines of the same step where nobody watches."""
+"""Time (s) between two progress lines of the same step without a terminal."""
 
 
 class StepProgress:
-    """Shows which step a run is at; called with the step's name, how much is done, of how much.
+    """Show the progress of a run; call it with the step's name, the amount done and the total.
 
     Args:
-        time_left: estimates the time that all steps together still take; None shows none.
+        time_left: estimate of the remaining time of all steps; None shows none.
     """
 
     def __init__(self, time_left: TimeLeft | None = None) -> None:
-        """Find out whether somebody watches."""
+        """Find out whether the output is a terminal."""
         self._left = time_left
         console = SafeConsole(stderr=True)
         self._bars = Progress(*self._columns(), console=console) if console.is_terminal else None
@@ -52,7 +52,7 @@ class StepProgress:
         return [*columns, _OverallColumn(self)] if self._left else columns
 
     def __enter__(self) -> "StepProgress":
-        """Begin to show."""
+        """Start the display."""
         if self._bars:
             self._bars.start()
         return self
@@ -63,13 +63,13 @@ class StepProgress:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        """End; what was shown stays."""
+        """Stop the display; its last state stays visible."""
         self._step = ""
         if self._bars:
             self._bars.stop()
 
     def __call__(self, step: str, done: int, total: int) -> None:
-        """Show that a step has come so far."""
+        """Show the progress of a step."""
         if self._left:
             self._left(step, done, total)
         begins, self._step = step != self._step, step
@@ -91,7 +91,7 @@ class StepProgress:
         self._said = now
 
     def overall(self, step: str) -> str:
-        """What is left of all steps, beside the step that runs; "" beside the others."""
+        """Text with the remaining time of all steps, for the running step; "" for the others."""
         return self._left.words() if self._left and step == self._step else ""
 
 

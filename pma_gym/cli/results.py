@@ -1,4 +1,4 @@
-"""The folder that a diagnosis or a fit writes: nothing older is lost, nothing is half there."""
+"""Result folder of a diagnosis or a fit: older results are protected, and files are complete."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -9,12 +9,12 @@ from pma_gym.files import OutputError, check_output, replace_file
 from pma_gym.partials import clean_folder
 
 JOURNAL = "unfinished"
-"""Folder of what an interrupted run has finished."""
+"""Folder of the finished parts of an interrupted run."""
 
 
 @dataclass(frozen=True)
 class Results:
-    """Where results go.
+    """Folder for the results of a run.
 
     Attributes:
         folder: the folder; it or its parent exists.
@@ -26,17 +26,17 @@ class Results:
 
     @property
     def journal(self) -> Path:
-        """Where finished fits are kept until all are."""
+        """Folder of finished fits until the run is complete."""
         return self.folder / JOURNAL
 
     def check(self, force: bool, resume: bool = False) -> None:
-        """Refuse a folder that holds an older result, before anything is computed.
+        """Reject a folder with an older result, before any computation.
 
         Args:
-            force: older results may be replaced.
-            resume: what an interrupted run left is wanted.
+            force: replace older results.
+            resume: continue an interrupted run.
         Raises:
-            OutputError: what is in the way, and the options that help.
+            OutputError: with the older files, and the options that help.
         """
         if self.folder.exists() and not self.folder.is_dir():
             raise OutputError(f"--out {self.folder} is no folder; name a folder for the results")
@@ -62,10 +62,10 @@ class Results:
 
     @contextmanager
     def opened(self, resume: bool = False) -> Iterator[None]:
-        """The folder, made and writable; if the run fails and nothing came into it, it goes.
+        """Create the folder and check that it is writable; remove it if a run fails without files.
 
         Args:
-            resume: keep what an interrupted run left.
+            resume: keep the finished parts of an interrupted run.
         Raises:
             OutputError: the folder cannot be made or written to.
         """
@@ -85,7 +85,7 @@ class Results:
             raise
 
     def write(self, files: Mapping[str, bytes]) -> None:
-        """Write all files, each whole; those of an older result that have no successor go."""
+        """Write all files atomically, and remove files of an older result that are not replaced."""
         for name in self.names:
             if name in files:
                 replace_file(self.folder / name, files[name])

@@ -1,4 +1,4 @@
-"""What all commands share: tables on the terminal, messages beside them, trials from files."""
+"""Functions for all commands: tables on the terminal, messages, trials from files."""
 
 import json
 import math
@@ -18,12 +18,12 @@ from pma_gym.terminal import SafeConsole, table_console
 
 
 def console() -> SafeConsole:
-    """Where tables go; as wide as they need where nobody watches."""
+    """Console for tables; as wide as needed if the output is not a terminal."""
     return table_console()
 
 
 def print_table(table: TextTable) -> None:
-    """Print a page's table on the terminal."""
+    """Print a table on the terminal."""
     shown = Table(*table.header, title=table.title)
     for row in table.rows:
         shown.add_row(*row)
@@ -44,13 +44,13 @@ def _finite(document: Any) -> Any:  # noqa: ANN401 - whatever JSON has
 
 
 def say(message: str) -> None:
-    """A message that is no result."""
+    """Print a message that is not a result, to stderr."""
     print(message, file=sys.stderr)
 
 
 @contextmanager
 def warnings_said() -> Iterator[None]:
-    """Says what reading trials passes over."""
+    """Print the warnings of reading trials."""
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", TrialWarning)
         yield
@@ -60,7 +60,7 @@ def warnings_said() -> Iterator[None]:
 
 @contextmanager
 def warnings_said_at_once(kind: type[Warning]) -> Iterator[None]:
-    """Says warnings of a kind as they come; others go where they went."""
+    """Print warnings of a kind at once; others are handled as before."""
     with warnings.catch_warnings():
         warnings.simplefilter("always", kind)
         show = warnings.showwarning
@@ -76,6 +76,6 @@ def warnings_said_at_once(kind: type[Warning]) -> Iterator[None]:
 
 
 def read(path: Path) -> Trial:
-    """The trial in a file; what was passed over in it is said."""
+    """Read the trial in a file, and print its warnings."""
     with warnings_said():
         return read_trial(path)

@@ -1,4 +1,4 @@
-"""How much longer a diagnosis or a fit takes, from what its steps took so far."""
+"""Estimate of the remaining time of a diagnosis or a fit, from its steps so far."""
 
 import re
 import time
@@ -14,7 +14,7 @@ ANSWER = "putting the answer together"
 
 _END = (LEFT_OUT, ANSWER)
 FIT: Mapping[str, tuple[str, ...]] = {REFIT: _END, LEFT_OUT: (ANSWER,), ANSWER: ()}
-"""What follows each step of a fit."""
+"""Steps that follow each step of a fit."""
 
 _SEARCH_ON = (LOOK, *_END)
 DIAGNOSIS: Mapping[str, tuple[str, ...]] = {
@@ -24,8 +24,8 @@ DIAGNOSIS: Mapping[str, tuple[str, ...]] = {
     FITS: _SEARCH_ON,
     RESTARTS: _SEARCH_ON,
 }
-"""What follows each step of a diagnosis, unless a further effect is added: then `FITS` and another
-`LOOK` come between."""
+"""Steps that follow each step of a diagnosis, unless a further effect is added: then `FITS` and
+another `LOOK` come between."""
 
 SHARES = {REFIT: 10.0, LOOK: 3.0, FITS: 20.0, RESTARTS: 20.0, LEFT_OUT: 7.0, ANSWER: 1.0}
 """Processor time of the steps relative to each other, measured on one trial of 20 000 rows and on
@@ -33,14 +33,14 @@ five of 3000 rows, with hysteresis hidden in them."""
 
 
 class TimeLeft:
-    """Estimates the time that is left; called as a diagnosis calls its `progress`.
+    """Estimate the remaining time; call it as a diagnosis calls its `progress`.
 
-    A step that ran before in this run is expected to take as long as it took then. One that did not
-    is expected to take its usual share of the time beside those that did.
+    A step that ran before in this run is expected to take the same time again. Another step is
+    expected to take its usual share of the time relative to those.
 
     Args:
-        following: step by step, without their numbers, which ones follow.
-        clock: the time in s.
+        following: for each step, without its number, the steps that follow.
+        clock: function that returns the time in s.
     """
 
     def __init__(
@@ -48,7 +48,7 @@ class TimeLeft:
         following: Mapping[str, tuple[str, ...]],
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        """Begin with nothing known."""
+        """Start without an estimate."""
         self._following = following
         self._clock = clock
         self._took: dict[str, float] = {}
@@ -57,7 +57,7 @@ class TimeLeft:
         self._done, self._total = 0, 0
 
     def __call__(self, step: str, done: int, total: int) -> None:
-        """Note how far a step has come."""
+        """Record the progress of a step."""
         now = self._clock()
         if step != self._step:
             if self._step:
@@ -66,9 +66,9 @@ class TimeLeft:
         self._done, self._total = done, total
 
     def seconds(self) -> tuple[float, float] | None:
-        """Seconds that are left: if no further effect is added, and if one is.
+        """Remaining time (s) without a further effect, and with one more.
 
-        None before the first step has ended, and in steps that are not known.
+        It is None before the first step has ended, and in unknown steps.
         """
         kind = _kind(self._step)
         if not self._took or kind not in self._following:
@@ -79,7 +79,7 @@ class TimeLeft:
         return least, least + self._expected(FITS) + self._expected(LOOK)
 
     def words(self) -> str:
-        """The same in words; "" where nothing is known yet."""
+        """The remaining time as text; "" if it is unknown."""
         left = self.seconds()
         if left is None:
             return ""

@@ -1,4 +1,4 @@
-"""From the text of a law to machine code: traced once, compiled for processors and GPUs alike.
+"""Compilation of laws to machine code: traced once, compiled for processors and GPUs.
 
 `graph` and `trace` call laws on values instead of numbers and remember the arithmetic; `derivative`
 differentiates it; `text` writes it as Python; `llvm` and `control` as LLVM instructions, scalar or

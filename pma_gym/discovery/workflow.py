@@ -9,7 +9,7 @@ from pma_gym.codegen.threads.sharing import linear_algebra_alone
 from pma_gym.data.datasets.dataset import Dataset, NamedTrial
 from pma_gym.data.trial import Trial
 from pma_gym.data.trial_columns import TrialError
-from pma_gym.discovery.answer import answer
+from pma_gym.discovery.answer.diagnosis_from_findings import diagnosis_from_findings
 from pma_gym.discovery.diagnosis import Diagnosis
 from pma_gym.discovery.fitting.fit_problem import FitProblem, Fitted
 from pma_gym.discovery.fitting.free_parameters import free_parameters
@@ -179,7 +179,9 @@ class _Work:
         findings = _without_worse(findings)
         findings = self._timed("confirmation", lambda: self._confirmed(findings))
         findings = self._timed("adequacy", lambda: self._judged(findings, logged))
-        diagnosis = self._timed("report", lambda: answer(findings, self._tell, self.propose))
+        diagnosis = self._timed(
+            "report", lambda: diagnosis_from_findings(findings, self._tell, self.propose)
+        )
         warnings = (*words, *diagnosis.warnings)
         return replace(diagnosis, warnings=warnings, seconds=dict(self.seconds))
 

@@ -1,4 +1,4 @@
-"""The catalogue: every phenomenon that a plant can have, one file each."""
+"""The catalogue of effects: every physical phenomenon that a plant can have, one file each."""
 
 from pma_gym.effects.cable.cable import CABLE
 from pma_gym.effects.cable.hanging_load import HANGING_LOAD
@@ -182,6 +182,6 @@ CATALOGUE: dict[str, Effect] = {
         FORCE_SENSOR_ERROR,
     )
 }
-"""Effects by name, in the order in which plants add them up."""
+"""Effects by name, in the order in which plants sum them."""
 
 __all__ = ["CATALOGUE", "Effect"]

@@ -1,4 +1,4 @@
-"""The arithmetic that laws are written in.
+"""Arithmetic functions for the laws of effects.
 
 Every law uses + - * / `abs` `**0.5`, `floor` of `pma_gym.codegen.generic` and the functions below,
 nothing else. Each is one scalar expression without side effects, so that the same text runs as
@@ -8,12 +8,12 @@ rebinds `where` for NumPy arrays.
 
 
 def where(condition, yes, no):
-    """`yes` where the condition holds, else `no`; both sides are evaluated."""
+    """Return `yes` where the condition holds, else `no`; both sides are evaluated."""
     return yes if condition else no
 
 
 def positive(value):
-    """The positive part, max(0, value); exact.
+    """Return the positive part, max(0, value); exact.
 
     >>> positive(3.5), positive(-3.5)
     (3.5, 0.0)
@@ -22,7 +22,7 @@ def positive(value):
 
 
 def clip(value, lower, upper):
-    """The value, held between two bounds; exact.
+    """Limit the value to two bounds; exact.
 
     >>> clip(5.0, 0.0, 1.0), clip(0.25, 0.0, 1.0)
     (1.0, 0.25)
@@ -31,7 +31,7 @@ def clip(value, lower, upper):
 
 
 def smoothstep(value):
-    """Rises from 0 to 1 as the value goes from 0 to 1, with zero slope at both ends.
+    """Blend from 0 to 1 as the value goes from 0 to 1, with zero slope at both ends.
 
     >>> smoothstep(-1.0), smoothstep(0.5), smoothstep(2.0)
     (0.0, 0.5, 1.0)
@@ -41,9 +41,9 @@ def smoothstep(value):
 
 
 def sloping(value, argument, slope):
-    """The value as it is, whose derivative by the argument is known to be `slope`.
+    """Return the value unchanged and give its derivative with respect to the argument.
 
-    A derivative of the law takes the slope instead of differentiating what the value is made of.
+    Symbolic differentiation then uses `slope` instead of differentiating the value's expression.
 
     >>> sloping(9.0, 3.0, 6.0)
     9.0
@@ -52,11 +52,11 @@ def sloping(value, argument, slope):
 
 
 def exponential(value):
-    """exp(value) by Taylor's series at value/128, squared seven times.
+    """Compute exp(value) by Taylor's series at value/128, squared seven times.
 
-    Relative error below 1e-12 for |value| <= 12, which covers what the force laws ask. A library
-    exp would neither vectorise nor give the same bits on every machine, and a quotient (Pade) costs
-    a division, which is as slow as eight products.
+    Relative error below 1e-12 for |value| <= 12, the range of the force laws. A library exp
+    would neither vectorise nor give the same bits on every machine. A Pade quotient needs a
+    division, which takes as long as eight products.
 
     >>> import math
     >>> abs(exponential(-8.0) / math.exp(-8.0) - 1.0) < 1e-12
@@ -76,10 +76,10 @@ def exponential(value):
 
 
 def cosine(value):
-    """cos(value) from 1 - cos by Taylor's series at value/256, its angle doubled eight times.
+    """Compute cos(value) by Taylor's series of 1 - cos at value/256 and eight angle doublings.
 
-    Absolute error below 1e-11 for |value| <= 300. 1 - cos keeps its digits where it is small:
-    doubling an angle takes u to 2 u (2 - u).
+    Absolute error below 1e-11 for |value| <= 300. Working with u = 1 - cos keeps the digits
+    where u is small: doubling the angle turns u into 2 u (2 - u).
 
     >>> import math
     >>> max(abs(cosine(0.5 * i) - math.cos(0.5 * i)) for i in range(-600, 601)) < 1e-11
@@ -97,7 +97,7 @@ def cosine(value):
 
 
 def interpolate(value, knots, heights):
-    """Linear between knots, constant outside them.
+    """Interpolate linearly between knots; the result is constant outside them.
 
     Args:
         value: where to interpolate.

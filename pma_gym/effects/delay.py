@@ -1,16 +1,15 @@
-"""Dead time of the commands: bus, converter and valve answer only after a while.
+"""Dead time of the commands, of bus, converter and valve, as a fourth-order Bessel filter.
 
-A true delay needs the past; an equation of motion has none. In its place stands the ladder of four
-memories that answers like Bessel's filter: its delay is the same at all frequencies that matter,
-it does not undershoot as Pade's approximation does, and overshoots by 0.8 %. For a delay T it has
-at frequency f, with w = 2 pi f T,
+A pure delay needs past values, which a differential equation does not have. A ladder of four states
+with the response of a Bessel filter approximates it: the delay is the same at all frequencies of
+interest, there is no undershoot as with a Pade approximation, and the overshoot is 0.8 %. The
+errors for a delay T at frequency f, with w = 2 pi f T, are
 
     phase       off by 1e-5 rad at w = 1, 0.003 rad at w = 2
     amplitude   about 1 - w^2 / 14: 1.8 % low at w = 0.5, 7 % at w = 1
 
-so a delay of 20 ms is good up to some 5 Hz, beyond what a muscle follows. A step's edge takes
-1.04 T from 10 to 90 %. Every delay comes with a share, which a diagnosis leaves at 1: the law is
-absent at 0.
+so a delay of 20 ms is accurate up to about 5 Hz, faster than a muscle follows. A step rises from
+10 to 90 % in 1.04 T. Every delay has a share: at 0 the law is absent. A diagnosis leaves it at 1.
 """
 
 from typing import Annotated, NamedTuple
@@ -19,7 +18,7 @@ from pma_gym.effects.effect import Effect
 from pma_gym.units import Quantity
 
 ELEMENTS = (1.0 / 10.0, 20.0 / 69.0, 1587.0 / 3430.0, 49.0 / 69.0)
-"""Time constants of the ladder by the delay, from s^4 + 10 s^3 + 45 s^2 + 105 s + 105 (Routh)."""
+"""Time constants of the ladder over the delay, from s^4 + 10 s^3 + 45 s^2 + 105 s + 105 (Routh)."""
 
 _SHARE = Quantity("1", 0, 1, "1 for a delay of the whole command", 0.0, usual=1)
 
@@ -41,10 +40,10 @@ class RegulatorDelay(NamedTuple):
 
 
 def ladder(asked, memory, delay):
-    """Rates of the ladder's memories: T e_i m_i' = m_(i-1) - m_(i+1).
+    """Rates of the ladder's states: T e_i m_i' = m_(i-1) - m_(i+1).
 
-    The first one's neighbour before is what is asked for, less itself; the last has none after it
-    and is what comes out. At rest the even ones are what is asked for, the odd ones 0.
+    For the first state, m_0 is the command minus m_1. The last state has no successor and is the
+    output. At rest the even states equal the command and the odd ones are 0.
     """
     own = 1.0 / delay
     following = (*memory[1:], 0.0)
@@ -58,12 +57,12 @@ def ladder(asked, memory, delay):
 
 
 def delayed_load(load_asked, memory, p):
-    """Load that the drive has heard of.
+    """Load command that reaches the drive after the dead time.
 
         L_out = (1 - share) L + m_4
 
     Args:
-        load_asked: load L that is asked of the drive (N).
+        load_asked: commanded load L (N).
         memory: the ladder m_1 to m_4 (N); m_4 is share L, one delay ago.
         p: DriveDelay: share, delay (s).
     Returns:
@@ -75,10 +74,10 @@ def delayed_load(load_asked, memory, p):
 
 
 def delayed_load_rate(load_asked, memory, p):
-    """Rates of the memories between the load that is asked for and the drive.
+    """Rates of the delay's states between the commanded load and the drive.
 
     Args:
-        load_asked: load that is asked of the drive (N).
+        load_asked: commanded load (N).
         memory: the ladder (N).
         p: DriveDelay.
     Returns:
@@ -88,12 +87,12 @@ def delayed_load_rate(load_asked, memory, p):
 
 
 def delayed_pressure(pressure_asked, memory, p):
-    """Pressure that the regulator has heard of.
+    """Pressure command that reaches the regulator after the dead time.
 
         P_out = (1 - share) P + m_4
 
     Args:
-        pressure_asked: gauge pressure P that is asked of the regulator (Pa).
+        pressure_asked: commanded gauge pressure P (Pa).
         memory: the ladder m_1 to m_4 (Pa); m_4 is share P, one delay ago.
         p: RegulatorDelay: share, delay (s).
     Returns:
@@ -105,10 +104,10 @@ def delayed_pressure(pressure_asked, memory, p):
 
 
 def delayed_pressure_rate(pressure_asked, memory, p):
-    """Rates of the memories between the pressure that is asked for and the regulator.
+    """Rates of the delay's states between the commanded pressure and the regulator.
 
     Args:
-        pressure_asked: gauge pressure that is asked of the regulator (Pa).
+        pressure_asked: commanded gauge pressure (Pa).
         memory: the ladder (Pa).
         p: RegulatorDelay.
     Returns:

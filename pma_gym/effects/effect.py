@@ -1,4 +1,4 @@
-"""What an effect is: one phenomenon, with its law, parameters, units, bounds and sources."""
+"""The class `Effect`: one phenomenon with its law, parameters, units, bounds and sources."""
 
 import inspect
 from collections.abc import Callable, Iterator, Mapping
@@ -14,7 +14,7 @@ from pma_gym.units import Quantity
 Value = float | tuple[float, ...]
 
 Parameters = Any
-"""An effect's parameters in SI: its own NamedTuple, which no annotation can name here."""
+"""An effect's parameters in SI, a NamedTuple that each effect's file defines."""
 
 
 @old_keywords(
@@ -34,38 +34,40 @@ class Effect:
 
     Attributes:
         name: name of the effect, and of its table in a model file.
-        port: where it acts; `pma_gym.plant` says which signals a port has and what it adds up.
+        port: where it acts; `pma_gym.effects.ports` lists each port's signals and how results
+            combine.
         parameters: NamedTuple class whose fields are Annotated with a `Quantity` each. A field's
-            default (SI) is what a file means that does not name it: a law that gets a parameter
-            more keeps its old files.
-        law: what the effect contributes at its port; None for a part that the plant reads.
-        rate: rate law of the memory, returning (source, decay) for memory' = source - decay *
-            memory; None without memory. It may be fast: the integrator is implicit.
-        rate_independent_law: law of a memory that depends on the distance travelled alone, not on
-            time: its value after `travel` without turning, from `memory`, `travel`, `direction`
-            and `p`. Exact, so it costs the integrator nothing; instead of `rate`.
-        path_breakpoint: distance (m) from where a travel begins, by `memory`, `direction` and `p`,
-            to where the rate-independent law changes form; not above 0 where it does so nowhere.
-            Steps end close to it.
-        release_path: way (m) until the memory exerts no force any more, by `memory`, `direction`
-            and `p`; where backlash lies before the effect, its gap is crossed then. None for an
-            effect that backlash does not reach.
+            default (SI) applies where a file does not name it, so that old files stay valid when a
+            law gets another parameter.
+        law: the effect's contribution at its port; None for parameters that the plant reads
+            directly.
+        rate: rate law of the effect's state, returning (source, decay) for memory' = source - decay
+            * memory; None without a state. It may be stiff: the integrator is implicit.
+        rate_independent_law: law of a state that depends on the distance travelled and not on time:
+            its value after `travel` without a reversal, from `memory`, `travel`, `direction` and
+            `p`. It replaces `rate` and is exact, so the integrator has no equation to solve.
+        path_breakpoint: distance (m) from the start of a travel, from `memory`, `direction` and
+            `p`, to the point where the rate-independent law changes form; 0 or less if there is no
+            such point. Steps end close to it.
+        release_path: distance (m) until the state exerts no force any more, from `memory`,
+            `direction` and `p`; with backlash before the effect, the gap is crossed from there on.
+            None for an effect that backlash does not affect.
         event: event function: a signal at whose zero the law has a kink; steps end there.
         breakpoint: a signal at whose zero the law changes form smoothly; steps end close to it.
-        signature: what sets the effect apart in measured data.
-        memories: how many numbers the memory has. Of more than one, laws get `memory` as a tuple,
-            and the rate law returns a (source, decay) for each.
-        memory_scale: what an error of the memory is counted against, roughly its range.
-        memory_start: the parameter (field name) that the memory equals where a trial begins; empty
-            where it begins at 0.
+        signature: feature of measured data that distinguishes the effect.
+        memories: number of states. With more than one, laws get `memory` as a tuple, and the rate
+            law returns a (source, decay) for each.
+        memory_scale: scale of the state for the integrator's error, roughly its range.
+        memory_start: the parameter (field name) that gives the state at the start; empty for 0.
         held: parameters (field names) that a diagnosis leaves at their usual values when it fits
-            the effect: geometry, and what only switches the law on.
-        ties: simpler laws in it, each a row of parameters (field names): where the first equals the
-            second, the others do nothing. A diagnosis takes the simpler law where its data do not
-            refuse it.
-        replaces: what it is one of several forms of, so that it stands in place of another effect
-            and not beside it: a model's force law or damping (compare such models as models), a
-            person, or a law of free shape. A diagnosis proposes none of these as missing.
+            the effect: geometry, and parameters that only switch the law on.
+        ties: simpler special cases of the law, each a row of parameters (field names): where the
+            first equals the second, the others have no effect. A diagnosis prefers the simpler law
+            unless the data reject it.
+        replaces: the part of a model that the effect is one of several forms of: a force law, a
+            damping, a person, or a law of free shape. Such an effect replaces another one and is
+            not added to it, so a diagnosis never proposes it as missing; compare whole models
+            instead.
     """
 
     name: str
@@ -88,22 +90,22 @@ class Effect:
 
     @cached_property
     def quantities(self) -> dict[str, Quantity]:
-        """Unit, bounds and source of every parameter, by field name."""
+        """Unit, bounds and source of every parameter, keyed by field name."""
         hints = get_type_hints(self.parameters, include_extras=True)
         return {name: hint.__metadata__[0] for name, hint in hints.items()}
 
     @property
     def neutral(self) -> Parameters | None:
-        """Parameters at which the law is exactly absent, or None if there are none such.
+        """Parameters at which the law is exactly absent, or None if there are none.
 
-        Those that have no neutral value are at their usual one.
+        Parameters without a neutral value are at their usual one.
         """
         known = {n: q.to_si(q.neutral) for n, q in self.quantities.items() if q.neutral is not None}
         return self.start._replace(**(self._usual | known)) if known else None
 
     @property
     def usual(self) -> Parameters:
-        """Parameters (SI) at their usual values; neutral, else mid-bounds, for one without.
+        """Parameters (SI) at their usual values, else at the neutral value, else at mid-bounds.
 
         >>> from pma_gym.effects import CATALOGUE
         >>> CATALOGUE["hysteresis"].usual
@@ -118,18 +120,18 @@ class Effect:
 
     @property
     def start(self) -> Parameters:
-        """Parameters in the middle of their bounds, a place to start a fit from."""
+        """Parameters in the middle of their bounds, as a start for a fit."""
         middle = {n: q.to_si(0.5 * (q.lower + q.upper)) for n, q in self.quantities.items()}
         return self.parameters(**middle)
 
     @cached_property
     def rows(self) -> tuple[str, ...]:
-        """Names of the parameters that are rows of numbers; the first one's increase."""
+        """Names of the parameters that are rows of numbers; the first row increases."""
         hints = get_type_hints(self.parameters)
         return tuple(name for name, hint in hints.items() if hint is not float)
 
     def names_at_the_door(self) -> Mapping[str, str]:
-        """Field name by its name in files, which ends in the unit: slope_n_per_kpa -> slope."""
+        """Map names in files, which end in the unit, to field names: slope_n_per_kpa -> slope."""
         return self._doors
 
     @cached_property
@@ -139,7 +141,7 @@ class Effect:
 
     @cached_property
     def defaults(self) -> Mapping[str, float]:
-        """Values in file units of the parameters that need not be named, by their names there.
+        """Default values (file units) of the optional parameters, keyed by their names in files.
 
         >>> from pma_gym.effects import CATALOGUE
         >>> dict(CATALOGUE["drive_dead_zone"].defaults)
@@ -152,10 +154,11 @@ class Effect:
         )
 
     def parse(self, values: Mapping[str, Value]) -> Parameters:
-        """Parameters in SI from values by their names in files; defaults for what has one.
+        """Convert values keyed by their names in files to parameters in SI; defaults fill the gaps.
 
         Raises:
-            ValueError: an unknown, missing or out-of-bounds parameter, naming all of it.
+            ValueError: an unknown, missing or out-of-bounds parameter, with its name, value and
+                bounds.
         """
         names = self.names_at_the_door()
         missing = [name for name in names if name not in values and name not in self.defaults]
@@ -172,7 +175,7 @@ class Effect:
         return self.checked(self.parameters(**given))
 
     def changed(self, parameters: Parameters, values: Mapping[str, Value]) -> Parameters:
-        """The parameters, some of them given anew by their names in files.
+        """Replace some parameters by values keyed by their names in files.
 
         Raises:
             ValueError: an unknown or out-of-bounds parameter.
@@ -182,7 +185,7 @@ class Effect:
         return self.checked(parameters._replace(**given))
 
     def checked(self, parameters: Parameters) -> Parameters:
-        """The parameters, if their rows belong together.
+        """Return the parameters after a check of their rows.
 
         Raises:
             ValueError: rows of different lengths, or a first row that does not increase.
@@ -214,7 +217,7 @@ class Effect:
         return converted if many else converted[0]
 
     def at_the_door(self, parameters: Parameters) -> dict[str, Value]:
-        """Values by their names in files: the inverse of `parse`."""
+        """Convert parameters to values keyed by their names in files: the inverse of `parse`."""
         out: dict[str, Value] = {}
         for door, stem in self.names_at_the_door().items():
             value, quantity = getattr(parameters, stem), self.quantities[stem]
@@ -224,7 +227,7 @@ class Effect:
 
     @property
     def memory_names(self) -> tuple[str, ...]:
-        """Names of the states that hold its memory: `memory_creep`, `memory_drive_delay_1`."""
+        """Names of the effect's states in the plant: `memory_creep`, `memory_drive_delay_1`."""
         if not (self.rate or self.rate_independent_law):
             return ()
         name = f"memory_{self.name}"
@@ -235,12 +238,12 @@ class Effect:
         )
 
     def shares_law(self, other: "Effect") -> bool:
-        """Whether it is another, or both are terms of one law: their memories follow one path."""
+        """Whether both are the same effect or terms of one law, with the same state."""
         path = self.rate_independent_law
         return self.name == other.name or (path is not None and path is other.rate_independent_law)
 
     def laws(self) -> Iterator[Callable]:
-        """The law and those beside it, where there are any."""
+        """All laws of the effect: its law, rate, path and event functions, those that it has."""
         of_memory = (
             self.rate,
             self.rate_independent_law,

@@ -1,4 +1,4 @@
-"""Where an episode ends: what the rig was never shown to survive."""
+"""Physical limits that end an episode, and the range in which a model is valid."""
 
 from typing import Annotated, NamedTuple
 
@@ -9,7 +9,7 @@ _REACH = "reach of Serres 2008, table I3, with margin"
 
 
 class Limits(NamedTuple):
-    """Physical limits of a rig; the environments read them."""
+    """Physical limits of a rig; environments end an episode beyond them."""
 
     contraction: Annotated[float, Quantity("mm", 0, 1000, f"{_REACH}: 70", usual=70)]
     stretch: Annotated[
@@ -20,7 +20,7 @@ class Limits(NamedTuple):
 
 
 class Validity(NamedTuple):
-    """Pressures that the numbers of a model were identified on; beyond them results are flagged."""
+    """Range of pressures that a model was identified at; results beyond it are flagged."""
 
     lowest: Annotated[float, Quantity("kPa", 0, 2000, "Serres 2008, table I3: 150", usual=150)]
     highest: Annotated[float, Quantity("kPa", 0, 2000, "Serres 2008, table I3: 575", usual=575)]

@@ -1,9 +1,9 @@
-"""Ports of a station: what effects give there, what they depend on, what leaves it unchanged.
+"""Ports of a station: the place, inputs, result and neutral value of the effects at each port.
 
-The station (`pma_gym.plant.rigs.station`) computes its signals one after the other, and finds
-its rest without the cable; so a law sees at its port what is known there. Rates of memories come
-last and see everything. `tests/effects/test_user_effects.py` holds this table and the station
-together.
+The station (`pma_gym.plant.rigs.station`) computes its signals one after the other, and its
+equilibrium without the cable. A law therefore has access to the signals that are known at its port.
+Rates of states come last and have access to all signals. `tests/effects/test_user_effects.py`
+checks this table against the station.
 """
 
 import math
@@ -18,7 +18,7 @@ EVERYTHING = (
     *("load_asked", "load_command", "load_arriving", "pressure_asked", "pressure_command"),
     *("stretch", "stretch_rate", "cable_tension", "muscle_force", "slide_force"),
 )
-"""Signals that rates of memories see, beside `memory` and `p`."""
+"""Signals that rate laws may depend on, in addition to `memory` and `p`."""
 
 _RANGES = {
     "contraction": 0.03,
@@ -43,14 +43,14 @@ class Port:
     """A place where effects act on a rig.
 
     Attributes:
-        result: what the effects there contribute, and what becomes of it.
-        least: fewest effects that it takes.
-        most: most effects that it takes.
-        only: names of the effects that it takes; any of this port if empty.
-        signals: what a law of an effect that users add there may depend on, beside `memory` and
+        result: the effects' contributions at the port, and how the rig uses them.
+        least: smallest number of effects.
+        most: largest number of effects.
+        only: names of the permitted effects; any effect of this port if empty.
+        signals: signals that the law of a user's effect may depend on, in addition to `memory` and
             `p`.
-        absent: what a law gives there that changes nothing, a number or the name of a signal;
-            None where users can add nothing.
+        absent: neutral value of a law at the port, a number or the name of a signal; None where
+            users can add no effects.
     """
 
     result: str
@@ -62,7 +62,7 @@ class Port:
 
     @property
     def takes(self) -> str:
-        """How many effects it takes, or which, in words."""
+        """Number or names of the permitted effects, as text."""
         if self.only:
             return " and ".join(self.only)
         if self.most == 1:
@@ -128,14 +128,13 @@ STATION_PORTS: dict[str, Port] = {
         "rate of the pressure beside the regulator's (Pa/s), added", signals=_MUSCLE, absent=0.0
     ),
 }
-"""Ports of a station: how many effects each takes, what becomes of their results, what their laws
-may depend on."""
+"""Ports of a station: for each the number of effects, the use of their results, and its signals."""
 
 SENSOR_PORTS: dict[str, Port] = {
     f"sensor:{output}": Port("reading on top of the truth, added", signals=_SENSOR, absent=0.0)
     for output in (sensor.port.removeprefix("sensor:") for sensor in SENSORS)
 }
-"""Ports of the sensors, which every rig has."""
+"""Ports of the sensors, the same for every rig."""
 
 OPEN_PORTS: dict[str, Port] = {
     name: port for name, port in (STATION_PORTS | SENSOR_PORTS).items() if port.absent is not None
@@ -144,5 +143,5 @@ OPEN_PORTS: dict[str, Port] = {
 
 
 def example(signal: str) -> float:
-    """A number (SI) that a signal may well have."""
+    """Typical value (SI) of a signal."""
     return _RANGES.get(signal, 200.0)

@@ -1,4 +1,4 @@
-"""Effects by earlier names: the models that users keep have them."""
+"""Earlier names of effects, which users' model files may still contain."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -6,11 +6,11 @@ from typing import Any
 from pma_gym.effects import CATALOGUE
 
 RENAMED_EFFECTS: Mapping[str, str] = {"operator": "hand_push"}
-"""New names by old ones."""
+"""Present names keyed by earlier ones."""
 
 
 def effect_name(name: str) -> str:
-    """An effect's present name; a user's own effect may have a name that was free again.
+    """Return an effect's present name; a user's effect may reuse an earlier name.
 
     >>> effect_name("operator"), effect_name("slide")
     ('hand_push', 'slide')
@@ -19,9 +19,9 @@ def effect_name(name: str) -> str:
 
 
 def with_present_names(tables: Mapping[str, Any]) -> dict[str, Any]:
-    """What is kept by effect, or by `effect.parameter`, by the effects' present names.
+    """Replace earlier names in keys that are an effect or `effect.parameter`.
 
-    A table that stands there by both names stays, for whoever reads it to refuse.
+    If both names of an effect are present, both stay, so that the reader of the file can reject it.
     """
     new = {}
     for path, table in tables.items():

@@ -1,8 +1,8 @@
-"""Laws without a shape of their own: straight lines between nine heights.
+"""Residual laws of free shape: straight lines between nine values.
 
-No phenomenon, but what a diagnosis draws where none of the catalogue fits: how much force, or load,
-is missing by contraction, speed, pressure or load. A model may carry one, so that it can be
-simulated with what nobody has named yet.
+They are no physical phenomena. A diagnosis fits them where no effect of the catalogue explains the
+data: they give the missing force, or load, as a function of contraction, speed, pressure or load.
+A model with such a law can be simulated although the cause is unknown.
 """
 
 from collections import namedtuple
@@ -14,13 +14,13 @@ from pma_gym.effects.effect import Effect
 from pma_gym.units import Quantity
 
 HEIGHTS = 9
-"""Heights of a law, equally far from each other."""
+"""Number of values of a law, equally spaced."""
 
 _HEIGHT = Quantity("N", -500, 500, "fitted, whatever it is", 0.0, usual=5.0)
 
 
 def _parameters(name: str, unit: str, least: float, most: float, usual: tuple[float, float]) -> Any:  # noqa: ANN401
-    """A NamedTuple of where heights begin, how far they reach, and the heights."""
+    """Make a NamedTuple of the first argument, the range of arguments and the values."""
     ends = {
         "first": Quantity(unit, least, most, "where the data begin", usual=usual[0]),
         "reach": Quantity(unit, 1.0, most - least, "how far they go from there", usual=usual[1]),
@@ -38,13 +38,13 @@ LoadOfLoad = _parameters("LoadOfLoad", "N", -100, 5000, (0, 1000))
 
 
 def between_heights(value, p):
-    """Height at a value, on straight lines between heights; constant beyond the ends.
+    """Interpolate linearly between the law's values; constant beyond the ends.
 
     Args:
-        value: where (SI).
-        p: first, reach: where heights lie; h0 ... h8: heights.
+        value: argument of the law (SI).
+        p: first, reach: argument of the first value and range of the arguments; h0 ... h8: values.
     Returns:
-        Height, in the unit of the heights (SI).
+        Value of the law, in the unit of h0 (SI).
     """
     place = (value - p.first) * (8.0 / p.reach)
     heights = (p.h0, p.h1, p.h2, p.h3, p.h4, p.h5, p.h6, p.h7, p.h8)
@@ -55,7 +55,7 @@ def between_heights(value, p):
 
 
 def force_of_contraction(contraction, p):
-    """Force on the slide by contraction (N), positive shortens the muscle.
+    """Missing force on the slide as a function of contraction (N); positive shortens the muscle.
 
     Args:
         contraction: shortening x from the resting length (m).
@@ -69,7 +69,7 @@ def force_of_contraction(contraction, p):
 
 
 def force_of_velocity(velocity, p):
-    """Force on the slide by speed (N), positive shortens the muscle.
+    """Missing force on the slide as a function of speed (N); positive shortens the muscle.
 
     Args:
         velocity: rate of contraction x' (m/s).
@@ -83,7 +83,7 @@ def force_of_velocity(velocity, p):
 
 
 def force_of_pressure(pressure, p):
-    """Force on the slide by pressure (N), positive shortens the muscle.
+    """Missing force on the slide as a function of pressure (N); positive shortens the muscle.
 
     Args:
         pressure: gauge pressure P (Pa).
@@ -97,10 +97,10 @@ def force_of_pressure(pressure, p):
 
 
 def load_of_load(load, p):
-    """Load that the drive asks for, more or less by what is missing.
+    """Load that the drive commands, corrected by the missing load.
 
     Args:
-        load: load that it would ask for (N).
+        load: load that the drive would command without the correction (N).
         p: LoadOfLoad.
     Returns:
         Load (N).

@@ -1,6 +1,6 @@
-"""What an effect of one's own must be, so that a station can have it and a diagnosis leave it out.
+"""Checks of users' effects: rules that let a station include one and a diagnosis leave it out.
 
-Each rule gives what is wrong, with the mend, or nothing.
+Each rule returns the error with its fix, or an empty string.
 """
 
 from collections.abc import Callable, Iterator
@@ -14,13 +14,13 @@ from pma_gym.units import with_unit
 
 
 def broken_rule(effect: Effect, module: ModuleType) -> str:
-    """The first rule that an effect of a module breaks, in words; empty if none."""
+    """Return the message of the first rule that an effect of a module breaks; empty if none."""
     rules = (_port, _parameters, _functions, _arguments, _arithmetic, _absence)
     return next((wrong for rule in rules if (wrong := rule(effect, module))), "")
 
 
 def numbers(law: Callable) -> Iterator[tuple[str, object]]:
-    """Numbers, and rows of them, that a law and what it calls read from around them."""
+    """Global numbers, and rows of numbers, that a law and the functions it calls use."""
     for function in (law, *_called(law)):
         for name, value in _globals(function).items():
             if isinstance(value, int | float | tuple):

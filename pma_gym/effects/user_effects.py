@@ -1,4 +1,4 @@
-"""Effects of one's own: a Python file beside the catalogue.
+"""Users' effects: a Python file whose effects are added to the catalogue.
 
     from typing import Annotated, NamedTuple
     from pma_gym.effects import Effect
@@ -14,9 +14,9 @@
 
     DRAG = Effect("drag", "slide_force", Drag, drag, signature="force as the square of speed")
 
-`load_effects` runs such a file, as `python file.py` would, because its user named it; nothing else
-is ever run. What it defines is checked and added to the catalogue of this process, where models,
-simulations and diagnoses find it.
+`load_effects` runs such a file as `python file.py` would, because the user named it; no other file
+is ever run. It checks the effects that the file defines and adds them to the catalogue of this
+process, for models, simulations and diagnoses.
 """
 
 import hashlib
@@ -30,10 +30,10 @@ from pma_gym.effects import CATALOGUE, Effect
 from pma_gym.effects.user_effect_checks import broken_rule, numbers
 
 _HEAD = ("schema", "name", "title", "plant")
-"""Keys of a model file that are no effects."""
+"""Keys of a model file that are not effects."""
 
 _sources: dict[str, "_Source"] = {}
-"""Where every effect comes from that is not the library's, by name."""
+"""Source file of every user effect, by the effect's name."""
 
 
 class _Source(NamedTuple):
@@ -45,14 +45,14 @@ class _Source(NamedTuple):
 
 
 class OwnEffectError(ValueError):
-    """A file of effects that cannot be used; says which effect, which rule, and how to mend it."""
+    """A file of effects cannot be used; the message names the effect, the rule and the fix."""
 
 
 def load_effects(path: str | Path) -> list[Effect]:
     """Run a Python file and add the effects that it defines to the catalogue.
 
     Args:
-        path: the file. Loading it again changes nothing, or brings what has changed in it.
+        path: the file. Loading it again applies the changes made to it, if any.
     Returns:
         The effects, as defined at the top of the file, in order.
     Raises:
@@ -84,7 +84,7 @@ def load_effects(path: str | Path) -> list[Effect]:
 
 
 def source_of(name: str) -> str:
-    """A hash of the text of an effect of one's own, for keys of compiled code; empty for others."""
+    """Hash of the source text of a user's effect, for keys of compiled code; empty for others."""
     return _sources[name].digest if name in _sources else ""
 
 

@@ -1,1 +1,1 @@
-"""The compiled control step of one or many environments, and the options that shape it."""
+"""The compiled control step of one or many environments, and its options."""

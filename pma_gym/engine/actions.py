@@ -1,4 +1,4 @@
-"""From actions to volts: an agent's action, checked, and the action of a voltage."""
+"""Conversion between actions and voltages, with checks of an agent's actions."""
 
 import math
 
@@ -10,40 +10,40 @@ from pma_gym.engine.options import Options
 from pma_gym.tasks import Actuator
 
 HIGHEST_VOLTAGE = 10.0
-"""What an action of 1 stands for (V); -1 stands for 0 V."""
+"""Voltage (V) of an action of 1; -1 is 0 V."""
 
 
 class CommandLine:
-    """What an agent may ask for, and how it asks for volts.
+    """Action space of an agent, and conversion of voltages to actions.
 
     Args:
         options: the environment's options.
-        actuator: whose voltage the (first) action is.
+        actuator: actuator of the (first) action.
 
     Attributes:
         space: the action space.
     """
 
     def __init__(self, options: Options, actuator: Actuator = "motor") -> None:
-        """Size the action space."""
+        """Set the size of the action space."""
         self._actuator = actuator
         self._size = 2 if options.regulator_action else 1
         self.space = spaces.Box(-1.0, 1.0, (self._size,), np.float32)
         self.begin(0.0)
 
     def begin(self, regulator_voltage: float) -> None:
-        """Start a trial from a station that was settled at a regulator voltage (V)."""
+        """Start a trial in equilibrium at a regulator voltage (V)."""
         self._rest = regulator_voltage
 
     def action_for(self, voltage: float, regulator_voltage: float | None) -> NDArray[np.float64]:
-        """The action that commands these voltages (V), held to 0-10 V."""
+        """Return the action for given voltages (V), limited to 0-10 V."""
         regulator = self._rest if regulator_voltage is None else regulator_voltage
         volts = (voltage, regulator)[: self._size]
         scaled = (2.0 / HIGHEST_VOLTAGE * value - 1.0 for value in volts)
         return np.array([min(max(value, -1.0), 1.0) for value in scaled])
 
     def checked(self, action: object) -> list[float]:
-        """An action's entries.
+        """Check an action and return its entries.
 
         Raises:
             ValueError: an action of the wrong shape or kind, or not finite.

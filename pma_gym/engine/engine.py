@@ -1,4 +1,4 @@
-"""Environments as arrays: one, or many that step together."""
+"""The class `Engine`: one or many environments as arrays, stepped together."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -34,43 +34,42 @@ _RESET = 1
 
 
 class ActionError(ValueError):
-    """Actions that no step is made by."""
+    """Invalid actions; no step was made."""
 
 
 class Engine(Episodes):
-    """State of n environments, and what moves it.
+    """Hold the state of n environments and step them.
 
-    What becomes of an environment depends on its seed, its episode and its actions alone, not on
-    the others, on how many there are, nor on the number of threads.
+    The results of an environment depend only on its seed, episode and actions, not on the other
+    environments, their number or the number of threads.
 
     Args:
         task: the task.
         options: the options, the same for all.
-        count: how many environments.
-        threads: how many threads step them.
+        count: number of environments.
+        threads: number of threads.
         single: integrate in single precision: faster, see `PMAVectorEnv`.
-        pressures: pressure of each, if they differ: as the option `pressure_kpa`, one each.
+        pressures: one value of the option `pressure_kpa` per environment, if they differ.
 
     Attributes:
-        count: how many environments.
-        threads: how many threads step them.
-        state_layout: places of an environment's numbers.
+        count: number of environments.
+        threads: number of threads.
+        state_layout: offsets of an environment's numbers.
         table: the observation's entries.
         width: environments that share a block, one lane each.
         nominal_model: the nominal model that controllers receive.
-        nominal: the Plant of the nominal model, with what `disturbances` need.
+        nominal: the Plant of the nominal model, with the effects that `disturbances` need.
         models: the Model of every environment's episode.
-        pressures: gauge pressure that every episode began at (Pa), shape (n,).
+        pressures: gauge pressure at the start of every episode (Pa), shape (n,).
         horizon: control steps after which an episode is truncated.
-        observations: of the last step or reset, float32, shape (n, entries).
-        rewards: of the last step, shape (n,).
-        terminated: of the last step, bool, shape (n,).
-        truncated: of the last step, bool, shape (n,).
+        observations: observations of the last step or reset, float32, shape (n, entries).
+        rewards: rewards of the last step, shape (n,).
+        terminated: flags of the last step, bool, shape (n,).
+        truncated: flags of the last step, bool, shape (n,).
         trace: true position at k / 384 s of a single environment (m or rad).
-        voltages: voltage of the task's actuator that a single environment's station received in
-            every step (V).
-        rest_motor: motor voltage that episodes begin at (V): it holds the load of a regulator's
-            task, by the nominal drive.
+        voltages: voltage of the task's actuator in every step of a single environment (V).
+        rest_motor: motor voltage at the start of episodes (V); with the nominal drive it holds the
+            load of a regulator's task.
     """
 
     def __init__(
@@ -82,7 +81,7 @@ class Engine(Episodes):
         single: bool = False,
         pressures: Sequence[Pressure] | None = None,
     ) -> None:
-        """Compile, make room, and send threads to work."""
+        """Compile, allocate arrays and start the threads."""
         super().__init__(task, options, count, single, pressures)
         self.threads = threads = max(1, min(threads, self.blocks))
         self._beginnings = np.tile(self._reset_arguments, (threads * BEGUN_PARTS, 1))
@@ -93,12 +92,12 @@ class Engine(Episodes):
         self._least_shared = LEAST_BEGUN if threads > 1 else count + 1
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Copy and pickle by construction: addresses and compiled code belong to their process."""
+        """Copy and pickle by construction: addresses and compiled code belong to one process."""
         made_with = self.task, self.options, self.count, self.threads, self.kernel.single
         return type(self), (*made_with, self.wanted), take(self)
 
     def __setstate__(self, state: Snapshot) -> None:
-        """Go on from a state that `__reduce__` gave."""
+        """Continue from the state of `__reduce__`."""
         put(self, state)
 
     def _parts(self, threads: int) -> list[list[NDArray[np.int64]]]:
@@ -117,20 +116,20 @@ class Engine(Episodes):
         return part
 
     def limit_steps(self, steps: int) -> None:
-        """Truncate episodes after so many control steps, or at the task's end if it comes first."""
+        """Truncate episodes after a number of control steps, but not after the task's end."""
         self.options = replace(self.options, max_episode_steps=steps)
         self.horizon = self.options.horizon(self.task)
         for part in (self._arguments, *(part for share in self._steps for part in share)):
             part[ARGUMENTS.index("horizon")] = self.horizon
 
     def step(self) -> int:
-        """Step all environments by `actions`; their results stand in the attributes.
+        """Step all environments with `actions`; the attributes contain the results.
 
         Returns:
             0 while no episode ended, else the sum of 1 if any terminated and 2 if any was
             truncated.
         Raises:
-            ActionError: an action that is not finite; nothing has happened then.
+            ActionError: an action that is not finite; the environments are unchanged then.
         """
         if self.kernel.check(self._address):
             raise ActionError("actions must be finite")
@@ -148,11 +147,11 @@ class Engine(Episodes):
         self._threads.run(_RESET)
 
     def close(self) -> None:
-        """End the threads."""
+        """Stop the threads."""
         self._threads.close()
 
     def advance(self, copy: Callable[[], Any], given: NDArray[np.float64]) -> Callable[[Any], Any]:
-        """The step of a single environment, as fast as Python can call it.
+        """Return the step of a single environment as a fast Python callable.
 
         Args:
             copy: makes the observation that is handed out.
@@ -181,7 +180,7 @@ class Engine(Episodes):
 
     @property
     def attempts(self) -> int:
-        """Attempts at internal steps in the last step, all lanes of a block counted as one."""
+        """Number of attempted internal steps in the last step; a block's lanes count as one."""
         return int(self._attempts[:, 0].sum())
 
 

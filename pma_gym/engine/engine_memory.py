@@ -1,4 +1,4 @@
-"""What environments are: numbers in blocks of lanes, and the kernel that works on them."""
+"""Memory of environments: numbers in blocks of lanes, and the kernel that steps them."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +15,7 @@ from pma_gym.tasks import Task
 
 
 class EngineMemory:
-    """Numbers of n environments, by place; see `Engine` for arguments and attributes.
+    """Memory of n environments; see `Engine` for arguments and attributes.
 
     Args:
         nominal_model: the nominal model that controllers receive.
@@ -31,7 +31,7 @@ class EngineMemory:
         count: int,
         single: bool,
     ) -> None:
-        """Compile, and make room."""
+        """Compile, and allocate arrays."""
         self.task, self.options, self.count = task, options, count
         self.nominal_model, self.nominal = nominal_model, nominal
         self.state_layout = StateLayout(tuple(self.nominal.states), task, options)
@@ -69,7 +69,7 @@ class EngineMemory:
         duration = (steps + 2) * options.period
         samples = int(duration * 384.0) + 8
         self.trace = np.zeros(samples if width == 1 else 1)
-        moves = self.task.protocol.motion is not None
+        moves = self.task.schedule.motion is not None
         self._ideals = self.task.ideals(samples if moves else 1)
         self.voltages = np.zeros(steps + 2 if width == 1 else 1)
         self._indices = np.zeros(max(self.count, 1), np.int64)
@@ -116,11 +116,11 @@ class EngineMemory:
         return out
 
     def numbers(self, name: str) -> NDArray[np.float64]:
-        """A number of every environment by its place's name, shape (n,); a copy."""
+        """Copy a number of every environment, given by name, shape (n,)."""
         return self.records[:, self.state_layout.offsets[name], :].reshape(-1)[: self.count].copy()
 
     def row(self, index: int) -> list[float]:
-        """All numbers of an environment, by place."""
+        """View of all numbers of an environment."""
         block, lane = divmod(index, self.width)
         return self.records[block, :, lane].tolist()
 
@@ -130,7 +130,7 @@ class EngineMemory:
         return int(self.integers[block, self.state_layout.offsets["count"], lane])
 
     def rows(self, indices: NDArray[np.int64]) -> NDArray[np.float64]:
-        """All numbers of some environments, shape (m, size of the record); a copy."""
+        """Copy all numbers of some environments, shape (m, size of the record)."""
         block, lane = np.divmod(indices, self.width)
         return self.records[block, :, lane]
 

@@ -1,4 +1,4 @@
-"""The model that an environment simulates: nominal, with what its task and options ask for."""
+"""The nominal model that an environment simulates, with the effects of its task and options."""
 
 from pma_gym.effects import CATALOGUE
 from pma_gym.engine.options import Options
@@ -7,11 +7,11 @@ from pma_gym.tasks import Task
 
 
 def rig_model(task: Task, options: Options) -> Model:
-    """The nominal model with all that the options ask for: somebody at the slide, if they do.
+    """Return the nominal model with the effects that the options need, such as a hand push.
 
     Raises:
-        ModelError: no such model, or one that cannot be used.
-        ValueError: a cascade where there must be a station.
+        ModelError: an unknown or invalid model.
+        ValueError: a cascade for a task that needs a station.
     """
     model = options.nominal
     if not model.rig.has_muscle:
@@ -35,7 +35,7 @@ def rig_model(task: Task, options: Options) -> Model:
 
 
 def nominal_model(task: Task, model: Model) -> Model:
-    """The nominal model that controllers receive: with a leg on its lever in an exercise."""
+    """Return the nominal model that controllers receive, in an exercise with a leg on the lever."""
     if task.exercise is None or "leg" in model.parameters or not model.rig.balances_loads:
         return model
     leg = CATALOGUE["leg"]
@@ -44,10 +44,10 @@ def nominal_model(task: Task, model: Model) -> Model:
 
 
 def motor_at_rest(model: Model, task: Task) -> float:
-    """Motor voltage that episodes begin at (V): what a nominal drive needs for the task's load.
+    """Motor voltage at the start of episodes (V), with which a nominal drive holds the task's load.
 
     Raises:
-        ValueError: the drive does not hold such a load.
+        ValueError: the drive cannot hold this load.
     """
     load = rest_load(model, task)
     if not load:
@@ -64,7 +64,7 @@ def motor_at_rest(model: Model, task: Task) -> float:
 
 
 def rest_load(model: Model, task: Task) -> float:
-    """Load that the motor holds as an episode begins (N), by the nominal pulley."""
+    """Load of the motor at the start of an episode (N), with the nominal pulley."""
     if task.exercise is None:
         return task.load
     return task.exercise.start_moment / model.parameters["rotor"].radius

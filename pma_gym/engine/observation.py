@@ -1,4 +1,4 @@
-"""What the agent sees: one table of entries, which packs, describes and bounds the observation."""
+"""The observation: a table of entries that computes, describes and bounds it."""
 
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
@@ -14,26 +14,26 @@ from pma_gym.units import SI_FACTORS
 BOUND = 5.0
 """Entries are clipped to +-5; all but runaway states stay within +-2."""
 
-EXTENSION_SCALE = TASKS["displacement"].protocol.span
-ROTATION_SCALE = TASKS["rotation"].protocol.span
+EXTENSION_SCALE = TASKS["displacement"].schedule.span
+ROTATION_SCALE = TASKS["rotation"].schedule.span
 LOAD_SCALE = 1000.0
 PRESSURE_SCALE = 600e3
-"""What 1.0 stands for (m, rad, N, Pa)."""
+"""Scale of each entry: the value that is 1.0 in the observation (m, rad, N, Pa)."""
 
 
 class Prescribed(NamedTuple):
-    """What the moment at a joint is compared with; numbers or traced values.
+    """Prescribed moment at a joint, in numbers or traced values.
 
     Attributes:
-        radius: of the pulley (m).
-        plan: moment over the angle that is prescribed.
+        radius: radius of the pulley (m).
+        plan: prescribed moment as a function of the angle.
     """
 
     radius: Any
     plan: MomentProfile
 
     def excess(self, load: Any, angle: Any) -> Any:  # noqa: ANN401
-        """Moment that a load (N) makes, less the one that is prescribed at an angle (rad): N m."""
+        """Moment of a load (N) minus the moment prescribed at an angle (rad), in N m."""
         return self.radius * load - self.plan.at(angle)
 
 
@@ -45,22 +45,22 @@ class ObservationTable:
         options: the environment's options.
 
     Attributes:
-        rows: (entry, what 1.0 stands for) in order.
+        rows: (entry, scale of 1.0) in order.
         space: the observation space.
         references: reference (m or rad) at every control step, and `preview` steps past the end.
     """
 
     def __init__(self, task: Task, options: Options) -> None:
         """List the entries, and evaluate the reference at every step once."""
-        protocol = task.protocol
+        schedule = task.schedule
         last = task.steps(options.control_rate_hz) + options.preview
-        self.references = protocol.reference(np.arange(last + 1) * options.period)
+        self.references = schedule.reference(np.arange(last + 1) * options.period)
         self.rows = _rows(task, options)
         self.space = spaces.Box(-BOUND, BOUND, (len(self.rows),), np.float32)
-        self._span = protocol.span
+        self._span = schedule.span
         self._preview = options.preview
         self._history, self.delay = options.history, options.observation_delay
-        self._quantity = protocol.quantity
+        self._quantity = schedule.quantity
 
     def describe(self) -> str:
         """The table of entries as text.
@@ -88,14 +88,13 @@ class ObservationTable:
         action: Sequence[Any],
         prescribed: Prescribed | None = None,
     ) -> list[Any]:
-        """The entries before they are clipped, of numbers or traced values.
+        """Compute the entries before clipping, from numbers or traced values.
 
         Args:
-            reading: part of a reading (SI) by its name, and how many control steps ago it was
-                taken.
-            reference: reference (m or rad) so many control steps ahead.
+            reading: function of a measured signal's name and its age in control steps (SI).
+            reference: function of the control steps ahead that returns the reference (m or rad).
             action: the last action, -1 to 1.
-            prescribed: of an exercise that prescribes a moment.
+            prescribed: the prescribed moment, in an exercise that has one.
         """
         delay = self.delay
 
@@ -123,18 +122,18 @@ class ObservationTable:
 def measured_position(
     quantity: str, reading: Callable[[str], Any], prescribed: Prescribed | None = None
 ) -> Any:  # noqa: ANN401
-    """The position that a task asks for (m, rad or N m), from parts of a reading by their names."""
+    """Measured position of the task's controlled quantity (m, rad or N m), from signals by name."""
     if prescribed is not None:
         return prescribed.excess(reading("load"), reading("rotation"))
     return -reading("extension") if SIGNALS[quantity].shortens else reading(quantity)
 
 
 def _rows(task: Task, options: Options) -> list[tuple[str, str]]:
-    unit = task.protocol.unit
-    span = f"{task.protocol.span / SI_FACTORS[unit]:g} {unit}"
+    unit = task.schedule.unit
+    span = f"{task.schedule.span / SI_FACTORS[unit]:g} {unit}"
     volts = "10 V, -1.0 = 0 V"
     now, less, delayed = "reference now", "reference now less measured position", "position heard"
-    if task.protocol.followed.is_force:
+    if task.schedule.followed.is_force:
         now, less = "prescribed moment at the measured angle", "prescribed less measured moment"
         delayed = "excess of the moment heard"
     return [

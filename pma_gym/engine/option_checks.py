@@ -10,14 +10,14 @@ from pma_gym.tasks import OPERATOR_BOUNDS, Operator
 
 LOWEST_PRESSURE_KPA = 150.0
 HIGHEST_PRESSURE_KPA = 575.0
-"""Pressures at which the station was ever shown (kPa): table I3."""
+"""Range of pressures (kPa) of the station's measurements: table I3."""
 
 Pressure = float | Sequence[float] | str
 """Gauge pressure of the episodes (kPa): one, several to draw from, or "random"."""
 
 
 def check_known(what: str, given: Iterable[str], known: Sequence[str]) -> None:
-    """Refuse names that nobody knows.
+    """Reject unknown names.
 
     Raises:
         TypeError: the first unknown name, the nearest known one, and all known.
@@ -32,13 +32,13 @@ def check_known(what: str, given: Iterable[str], known: Sequence[str]) -> None:
 def check_keywords(
     caller: str, given: Iterable[str], known: Sequence[str], others: Sequence[str] = ()
 ) -> None:
-    """Refuse keyword arguments that do not exist, in Python's own words.
+    """Reject unknown keyword arguments with the wording of Python's own message.
 
-    Libraries look for these words to see whether an environment takes an argument.
+    Libraries look for this wording to find out whether an environment accepts an argument.
 
     Args:
-        caller: who takes them.
-        given: names that came.
+        caller: name of the called function or class.
+        given: names given.
         known: names of the options.
         others: names of further keyword arguments of the caller.
     Raises:
@@ -53,10 +53,10 @@ def check_keywords(
 
 
 def check_named(what: str, value: object, known: Iterable[str]) -> None:
-    """Refuse a value that is none of the known names.
+    """Reject a value that is not a known name.
 
     Raises:
-        ValueError: what it is, the known names, what came and the nearest known name.
+        ValueError: with the known names, the value and the nearest known name.
     """
     names = list(known)
     if not isinstance(value, str) or value not in names:
@@ -64,10 +64,10 @@ def check_named(what: str, value: object, known: Iterable[str]) -> None:
 
 
 def check_operator(operator: Operator) -> None:
-    """Refuse an operator whom nobody could be.
+    """Reject an operator with a parameter out of range.
 
     Raises:
-        ValueError: names the number, its range and unit, and what came.
+        ValueError: with the parameter, its range and unit, and its value.
     """
     for name, value in operator._asdict().items():
         lower, upper, unit = OPERATOR_BOUNDS[name]
@@ -75,10 +75,10 @@ def check_operator(operator: Operator) -> None:
 
 
 def check_pressure(pressure: object) -> None:
-    """Refuse a pressure that the station was never shown at.
+    """Reject a pressure outside the range of the station's measurements.
 
     Raises:
-        ValueError: names the range, the unit and what came.
+        ValueError: with the range, the unit and the value.
     """
     if isinstance(pressure, str) and pressure == "random":
         return
@@ -92,10 +92,10 @@ def check_pressure(pressure: object) -> None:
 
 
 def parse_pressure(given: object) -> Pressure:
-    """The checked pressure of episodes, as plain Python values.
+    """Check the pressure of episodes and return it as plain Python values.
 
     Raises:
-        ValueError: names the range, the unit and what came.
+        ValueError: with the range, the unit and the value.
     """
     pressure = plain_sequence(given)
     check_pressure(pressure)
@@ -103,10 +103,10 @@ def parse_pressure(given: object) -> Pressure:
 
 
 def parse_pressures(given: object, count: int) -> list[Pressure]:
-    """The checked pressures of so many environments, one each, as plain Python values.
+    """Check one pressure per environment and return them as plain Python values.
 
     Raises:
-        ValueError: names the rule and what came.
+        ValueError: with the rule and the value.
     """
     pressures = plain_sequence(given)
     length = f"{len(pressures)}" if isinstance(pressures, list) else "no sequence"
@@ -121,30 +121,30 @@ def parse_pressures(given: object, count: int) -> list[Pressure]:
 
 
 def check_count(name: str, count: object, most: int) -> None:
-    """Refuse a number of things that is none.
+    """Reject an invalid number of things.
 
     Raises:
-        ValueError: names it, the rule and what came.
+        ValueError: with the name, the rule and the value.
     """
     if not is_whole(count) or not 1 <= count <= most:
         raise ValueError(f"{name} must be a whole number in 1-{most}, got {count!r}")
 
 
 def check_whole(name: str, value: object) -> None:
-    """Refuse what is no whole number of control steps in 0-1000.
+    """Reject a value that is not a whole number of control steps in 0-1000.
 
     Raises:
-        ValueError: names the option, the rule and what came.
+        ValueError: with the option, the rule and the value.
     """
     if not is_whole(value) or not 0 <= value <= 1000:
         raise ValueError(f"{name} must be a whole number of control steps in 0-1000, got {value!r}")
 
 
 def check_number(name: str, value: object, lower: float, upper: float, unit: str) -> None:
-    """Refuse what is no number of a range.
+    """Reject a value that is not a number within a range.
 
     Raises:
-        ValueError: names the option, its range and unit, and what came.
+        ValueError: with the option, its range and unit, and the value.
     """
     # `not <=`: NaN is out of every range.
     if not is_real(value) or not lower <= value <= upper:
@@ -152,17 +152,17 @@ def check_number(name: str, value: object, lower: float, upper: float, unit: str
 
 
 def is_real(value: object) -> TypeGuard[float]:
-    """Whether a value is a real number; True and False are none."""
+    """Whether a value is a real number; True and False are not."""
     return isinstance(value, numbers.Real) and not isinstance(value, bool)
 
 
 def is_whole(value: object) -> TypeGuard[int]:
-    """Whether a value is a whole number; True and False are none."""
+    """Whether a value is a whole number; True and False are not."""
     return isinstance(value, numbers.Integral) and not isinstance(value, bool)
 
 
 def unknown_name(what: str, value: object, names: Sequence[str]) -> ValueError:
-    """The error of a value that is none of the known names; says the nearest one."""
+    """Return the error for an unknown name, with the nearest known one."""
     return ValueError(
         f"{what} must be one of {', '.join(names)}, got {value!r}{_nearest(value, names)}"
     )

@@ -1,4 +1,4 @@
-"""The environments' options: checked once, with errors that say how to fix them."""
+"""The environments' options and their checks; errors contain the fix."""
 
 import copy
 from collections.abc import Mapping, Sequence
@@ -43,7 +43,7 @@ from pma_gym.tasks import (
 
 
 class DefaultSteps(int):
-    """A number of steps that follows from the options, not one that a user asked for."""
+    """Number of steps that follows from the options and was not set by a user."""
 
     # Gymnasium 1.1 takes it as a bound of a Box only if NumPy knows it as an integer.
     dtype = np.dtype(np.int64)
@@ -57,40 +57,40 @@ OPERATORS = ("random", "typical")
 class Options:
     """Keyword arguments of the environments; each survives JSON (a model as a name or path).
 
-    Numbers of NumPy, arrays, ranges and paths are kept as plain Python values.
+    NumPy numbers, arrays, ranges and paths become plain Python values.
 
     Attributes:
         pressure_kpa: gauge pressure of the episodes (kPa): a number, several to draw from (a list,
-            a range, an array), or "random" for any that the task's trials begin at.
+            a range, an array), or "random" for all initial pressures of the task's trials.
         model: name of a shipped model, path of a TOML file, or a Model.
-        memory_at_start: where the muscle's hysteresis stands as an episode begins, -1 to 1 (1: it
-            was filled and has contracted); None: as the model says, or where a randomisation draws
-            it, as drawn. A model without hysteresis has nothing to begin with.
-        control_rate_hz: control steps a second (Hz).
-        preview: how many future references the observation holds, one a control step.
-        noise: sensor noise and quantisation; the sensors' lag stays either way.
-        action_delay_s: time from an action to the drive (s), whole control steps.
-        observation_delay_s: age of the sensors' values when the agent receives them (s), whole
-            control steps.
-        history: how many earlier readings of the position the observation holds.
+        memory_at_start: initial hysteresis state of the muscle, -1 to 1 (1: filled and contracted);
+            None: the value of the model or of the randomisation. It has no effect on a model
+                without
+            hysteresis.
+        control_rate_hz: control rate (Hz).
+        preview: number of future references in the observation, one per control step.
+        noise: add sensor noise and quantisation; the sensors' lag applies always.
+        action_delay_s: delay from an action to the drive (s), whole control steps.
+        observation_delay_s: age of the measurements when the agent receives them (s), whole control
+            steps.
+        history: number of earlier measured positions in the observation.
         reward: name of a reward in `pma_gym.tasks.REWARDS`; or a function of four numbers, which
             is called after every step: the true error in percent of the range, the largest change
             of an action, the true position and its reference in the units of the info (mm, deg
-            or N m). It does not survive JSON.
-        reward_scale: positive number that every reward is multiplied by.
-        randomisation: name of a randomisation in `pma_gym.tasks.RANDOMISATIONS`; or, for stations
-            of one's own, a function of the nominal model and a generator that gives a model with
-            the same effects (it does not survive JSON).
+            or N m). A function cannot be written to JSON.
+        reward_scale: positive factor on every reward.
+        randomisation: name of a randomisation in `pma_gym.tasks.RANDOMISATIONS`; or a function of
+            the nominal model and a generator that returns a model with the same effects (a
+            function cannot be written to JSON).
         regulator_action: whether a second action commands the regulator (0-10 V).
         disturbances: name of disturbances in `pma_gym.tasks.DISTURBANCES`.
-        operator: who works in an exercise: "random" (drawn at every reset), "typical", or a
-            `pma_gym.tasks.Operator` (which does not survive JSON).
-        safety: whether an exercise has its safety layer between agent and regulator.
-        tolerance: largest error of an internal step of the integrator, as a share of what the
-            plant's states are counted against (`Plant`); a larger one is faster, a smaller one
-            more exact.
+        operator: operator of an exercise: "random" (drawn at every reset), "typical", or a
+            `pma_gym.tasks.Operator` (which cannot be written to JSON).
+        safety: whether an exercise has its safety filter between agent and regulator.
+        tolerance: largest error of an internal step of the integrator, relative to the scales of
+            the plant's states (`Plant`); a larger one is faster, a smaller one more accurate.
         max_episode_steps: control steps after which an episode is truncated, if its task lasts
-            longer; None: as long as the task.
+            longer; None for the length of the task.
     """
 
     pressure_kpa: Pressure = "random"
@@ -113,55 +113,55 @@ class Options:
     max_episode_steps: int | None = None
 
     def __getstate__(self) -> dict[str, Any]:
-        """Its fields for pickle; functions among them need no module."""
+        """Return the fields for pickle; functions among them need no module."""
         return {n: packed(n, v) if callable(v) else v for n, v in vars(self).items()}
 
     def __setstate__(self, state: Mapping[str, Any]) -> None:
-        """Take what `__getstate__` gave."""
+        """Restore the fields from `__getstate__`."""
         given = {n: v.value() if isinstance(v, Packed) else v for n, v in state.items()}
         self.__dict__.update(given)
 
     def __deepcopy__(self, memo: dict[int, Any]) -> Self:
-        """A copy that keeps functions, and copies objects that act as one."""
+        """Return a copy that shares functions and copies callable objects."""
         return replace(self, **{n: copy.deepcopy(v, memo) for n, v in vars(self).items()})
 
     @property
     def disturbing(self) -> Disturbances:
-        """Sizes of what disturbs."""
+        """Sizes of the disturbances."""
         return DISTURBANCES[self.disturbances]
 
     @property
     def draw(self) -> Randomisation:
-        """What gives the station of an episode."""
+        """Function that draws the station of an episode."""
         chosen = self.randomisation
         return RANDOMISATIONS[chosen] if isinstance(chosen, str) else chosen
 
     @property
     def period(self) -> float:
-        """Time of a control step (s)."""
+        """Duration of a control step (s)."""
         return 1.0 / self.control_rate_hz
 
     @property
     def action_delay(self) -> int:
-        """Time from an action to the drive, in control steps."""
+        """Delay from an action to the drive, in control steps."""
         return round(self.action_delay_s * self.control_rate_hz)
 
     @property
     def observation_delay(self) -> int:
-        """Age of the sensors' values when the agent receives them, in control steps."""
+        """Age of the measurements when the agent receives them, in control steps."""
         return round(self.observation_delay_s * self.control_rate_hz)
 
     @property
     def reward_name(self) -> str:
-        """Name of the reward; "function" for a user's, whatever it is."""
+        """Name of the reward; "function" for a user's function."""
         return self.reward if isinstance(self.reward, str) else "function"
 
     @property
     def nominal(self) -> Model:
-        """The model as it is read, with memories where episodes shall begin.
+        """The loaded model, with the initial hysteresis state of the options.
 
         Raises:
-            ModelError: no such model, or one that cannot be used.
+            ModelError: an unknown or invalid model.
         """
         return begun_at(load_model(self.model), self.memory_at_start)
 
@@ -197,12 +197,12 @@ class EnvironmentOptions(TypedDict, total=False):
 def parse_options(
     given: Mapping[str, Any], caller: str = "the environment", others: Sequence[str] = ()
 ) -> Options:
-    """Checked options from keyword arguments.
+    """Check keyword arguments and return the options.
 
     Args:
         given: the keyword arguments.
-        caller: who takes them, for the message.
-        others: names of further keyword arguments that the caller takes, for the message.
+        caller: name of the called function or class, for the message.
+        others: names of the caller's further keyword arguments, for the message.
 
     Raises:
         TypeError: an unknown keyword, with the nearest known one.
@@ -248,11 +248,11 @@ def parse_options(
 
 
 def parse_task(given: str | Task, options: Options) -> Task:
-    """The task of a name, or a task as it is, if the options suit it.
+    """Return the task of a name, or a given Task, after a check of the options.
 
     Raises:
-        ValueError: an unknown name, with the nearest known one; or an option that the task has no
-            use for.
+        ValueError: an unknown name, with the nearest known one; or an option that does not apply
+            to the task.
     """
     task = named_task(given) if isinstance(given, str) else given
     if not isinstance(task, Task):

@@ -1,11 +1,11 @@
-"""Options of environments by earlier names: scripts, policies, suites and presets have them."""
+"""Earlier names of environment options, which users' scripts, policies and suites may contain."""
 
 import warnings
 from collections.abc import Mapping
 from typing import Any
 
 RENAMED_OPTIONS: Mapping[str, str] = {"human": "operator"}
-"""New names of options by old ones."""
+"""Present names of options, keyed by earlier ones."""
 
 RENAMED_VALUES: Mapping[str, Mapping[str, str]] = {
     "disturbances": {
@@ -13,18 +13,18 @@ RENAMED_VALUES: Mapping[str, Mapping[str, str]] = {
         "regulator_and_operator": "regulator_and_hand_push",
     },
 }
-"""New values by old ones, by the option's new name."""
+"""Present values keyed by earlier ones, by the option's present name."""
 
 
 def renamed_options(given: Mapping[str, Any], what: str, stacklevel: int = 2) -> dict[str, Any]:
-    """Options by their present names and values, in their order; one warning if any was old.
+    """Replace earlier names and values of options, in order, with one warning if there are any.
 
     Args:
         given: names and values.
-        what: whose options they are, for the message.
+        what: owner of the options, for the message.
         stacklevel: as `warnings.warn` counts it from the caller.
     Raises:
-        TypeError: an option comes by both names.
+        TypeError: both names of an option are given.
 
     Example:
         >>> renamed_options({"operator": "typical", "noise": False}, "the environment")

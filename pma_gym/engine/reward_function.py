@@ -1,4 +1,4 @@
-"""The signature of a reward function that a user gives, and its check."""
+"""Signature of a user's reward function, and its check."""
 
 import inspect
 from collections.abc import Callable
@@ -6,9 +6,9 @@ from typing import Protocol
 
 
 class RewardFunction(Protocol):
-    """Reward of a step; four plain floats in, a finite number out.
+    """Reward of a step: a function of four floats that returns a finite number.
 
-    The arguments come by position, in this order:
+    The arguments are positional, in this order:
 
     - the true error at the step's end, in percent of the task's range;
     - the largest change of an entry of the action (-1 to 1) since the step before;
@@ -30,10 +30,10 @@ RULE = (
 
 
 def check_reward_function(reward: Callable[..., object]) -> None:
-    """Refuse what cannot be called with four numbers.
+    """Reject a value that cannot be called with four numbers.
 
     Raises:
-        ValueError: names the rule and what came.
+        ValueError: with the rule and the value.
     """
     try:
         signature = inspect.signature(reward)

@@ -1,4 +1,4 @@
-"""The state of an engine as a value: taken, checked, and put back."""
+"""The state of an engine as a value: take, check and restore it."""
 
 from typing import Any, NamedTuple
 
@@ -15,7 +15,7 @@ _WORD = 1 << 32
 
 
 class StateError(ValueError):
-    """A state that an environment cannot take; says why, and what to do."""
+    """A state does not fit an environment; the message has the reason and the fix."""
 
 
 class Snapshot(NamedTuple):
@@ -28,15 +28,15 @@ class Snapshot(NamedTuple):
         numbers: what the compiled step reads and writes, float64, shape (n, numbers), in the order
             of `setup`'s entry `numbers`. Control steps and the random numbers' key and counter
             stand there as int64.
-        pressures: gauge pressure that every episode began at (Pa), float64, shape (n,).
+        pressures: gauge pressure at the start of every episode (Pa), float64, shape (n,).
         observations: last observation, float32, shape (n, entries).
         rewards: last reward, float64, shape (n,).
         flags: last terminated and truncated, bool, shape (2, n).
         trajectory: true position at k / 384 s so far, of a single environment, float64.
         voltages: voltage of the actuator in every step so far (V), of a single environment,
             float64.
-        models: of every environment the Model that its episode was drawn, None for the nominal one;
-            empty if none is drawn.
+        models: the drawn Model of each environment's episode, None for the nominal one; empty if
+            none is drawn.
     """
 
     numbers: bytes
@@ -50,7 +50,7 @@ class Snapshot(NamedTuple):
 
 
 def take(engine: EngineMemory) -> Snapshot:
-    """The state of an engine's environments."""
+    """Return the state of an engine's environments."""
     trajectory = voltages = b""
     if engine.width == 1:
         row = engine.records[0, :, 0]
@@ -80,11 +80,10 @@ def _models(engine: EngineMemory) -> tuple[Model | None, ...]:
 
 
 def put(engine: EngineMemory, state: Snapshot) -> None:
-    """Let an engine's environments go on from a state, whose parts are checked first.
+    """Check a state and restore it to an engine's environments.
 
     Raises:
-        StateError: a part of another size, or a number that no environment has; nothing has
-            changed then.
+        StateError: a part of another size, or an impossible number; the engine is unchanged then.
     """
     n, size = engine.count, engine.state_layout.size
     numbers = _array(state, "numbers", np.float64, n * size).reshape(n, size)
@@ -166,7 +165,7 @@ def _check_numbers(engine: EngineMemory, numbers: NDArray[np.float64]) -> None:
 
 def _squares(engine: EngineMemory) -> list[str]:
     pace = PACE.phases if engine.task.exercise else ()
-    sums = [f"sum_{phase.name}" for phase in engine.task.protocol.phases]
+    sums = [f"sum_{phase.name}" for phase in engine.task.schedule.phases]
     return [*sums, *(f"pace_{phase.name}" for phase in pace)]
 
 

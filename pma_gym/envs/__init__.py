@@ -19,7 +19,7 @@ ENVIRONMENTS = {
     "pma_gym/IsotonicContraction-v0": "isotonic",
     "pma_gym/ResistiveExercise-v0": "isokinetic_exercise",
 }
-"""Registered environments, and the task of each; `task=` gives another."""
+"""Registered environment ids with their default tasks; `task=` selects another."""
 
 for _name, _task in ENVIRONMENTS.items():
     # An id stays as it was registered: a user's own entry under it, or a second import's.

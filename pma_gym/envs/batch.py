@@ -1,4 +1,4 @@
-"""Arguments and infos of a batch of environments, in Gymnasium's form."""
+"""Checks of a batch's arguments, and its infos in Gymnasium's form."""
 
 from collections.abc import Mapping, Sequence
 from numbers import Integral
@@ -12,13 +12,13 @@ from pma_gym.engine.plain_values import plain_scalar
 
 
 def all_seeds(seed: int | Sequence[int | None] | None, count: int) -> list[int | None]:
-    """The seed of every environment, None for one that goes on with its own.
+    """Return one seed per environment, None for an environment that keeps its seed.
 
     Args:
-        seed: seed of the first, the others counting up from it; or one each.
-        count: how many environments.
+        seed: seed of the first environment, with consecutive seeds for the others; or one each.
+        count: number of environments.
     Raises:
-        ValueError: names the rule and what came.
+        ValueError: with the rule and the invalid value.
     """
     if seed is None:
         return [None] * count
@@ -38,10 +38,10 @@ def all_seeds(seed: int | Sequence[int | None] | None, count: int) -> list[int |
 
 
 def parse_seed(seed: object) -> int | None:
-    """The seed of a single environment, as Python's own number.
+    """Check the seed of a single environment and return it as an int.
 
     Raises:
-        ValueError: names the rule and what came.
+        ValueError: with the rule and the invalid value.
     """
     given = plain_scalar(seed)
     if given is not None and not _is_seed(given):
@@ -54,10 +54,10 @@ def _is_seed(value: object) -> TypeGuard[int]:
 
 
 def masked(mask: object, count: int) -> NDArray[np.int64]:
-    """Numbers of the environments in a mask.
+    """Check a reset mask and return the indices of its environments.
 
     Raises:
-        ValueError: names the rule and what came.
+        ValueError: with the rule and the invalid value.
     """
     array = np.asarray(mask)
     if array.shape != (count,) or array.dtype != np.bool_ or not array.any():
@@ -71,14 +71,14 @@ def masked(mask: object, count: int) -> NDArray[np.int64]:
 def wanted_pressures(
     options: Mapping[str, Any], indices: NDArray[np.int64], count: int
 ) -> list[Pressure] | None:
-    """Pressures of the episodes that begin, if a reset's options tell any.
+    """Return the pressures that a reset's options set, or None.
 
     Args:
-        options: may hold `pressure_kpa` for all, or `pressures_kpa` for each environment.
-        indices: the environments that begin.
-        count: how many there are.
+        options: may contain `pressure_kpa` for all, or `pressures_kpa` for each environment.
+        indices: the environments to reset.
+        count: number of environments.
     Raises:
-        ValueError: names the rule and what came.
+        ValueError: with the rule and the invalid value.
     """
     if "pressures_kpa" in options:
         if "pressure_kpa" in options:
@@ -93,13 +93,13 @@ def wanted_pressures(
 def spread(
     columns: Mapping[str, Any], mask: NDArray[np.bool_], indices: NDArray[np.int64]
 ) -> dict[str, Any]:
-    """Values of the environments in a mask as arrays of all, each with a mask of its own.
+    """Expand values of some environments to arrays over all, each with its mask.
 
     Args:
-        columns: arrays by name, one value for each environment in the mask, or dictionaries of
-            such; NaN for a value that there is not.
+        columns: arrays by name, one value per environment in the mask, or dictionaries of such
+            arrays; NaN for a missing value.
         mask: bool, shape (num_envs,).
-        indices: where it is true.
+        indices: indices where the mask is true.
     """
     info: dict[str, Any] = {}
     for name, values in columns.items():
@@ -119,26 +119,26 @@ def spread(
 
 
 class BatchActions:
-    """Takes the actions of a batch, or says what is wrong with them.
+    """Copy the actions of a batch to the engine, or reject invalid ones.
 
     Args:
-        given: where the engine reads actions, shape (num_envs, entries of an action).
+        given: the engine's array of actions, shape (num_envs, entries of an action).
 
     Attributes:
-        given: as given.
+        given: the same array.
     """
 
     def __init__(self, given: NDArray[Any]) -> None:
         self.given = given
 
     def take(self, actions: object, waiting: NDArray[np.int64] | None) -> None:
-        """Hand actions over; those of episodes that have ended mean nothing.
+        """Copy actions to the engine; actions of ended episodes have no effect.
 
         Args:
             actions: shape (num_envs, entries of an action).
-            waiting: numbers of the environments whose episode has ended, None if none has.
+            waiting: indices of the environments whose episode has ended, None if none has.
         Raises:
-            ValueError: actions of another shape or kind; says the rule.
+            ValueError: actions of another shape or type; with the rule.
         """
         try:
             array = np.asarray(actions)
@@ -155,7 +155,7 @@ class BatchActions:
             self.given[waiting] = 0.0
 
     def not_finite(self) -> ValueError:
-        """What is wrong with actions that the engine refuses."""
+        """Return the error for actions that are not finite."""
         row = int(np.flatnonzero(~np.isfinite(self.given).all(axis=1))[0])
         return ValueError(
             f"{self._rule}, all of them finite; environment {row} got "

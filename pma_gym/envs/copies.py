@@ -1,4 +1,4 @@
-"""Copies and pickles of environments: they go on with the same bits, independently."""
+"""Copies and pickles of environments, which continue independently with the same bits."""
 
 import copy
 from collections.abc import Mapping
@@ -10,14 +10,14 @@ from pma_gym.pickling import Packed, packed
 
 
 class Copies:
-    """An environment that `copy.copy`, `copy.deepcopy` and pickle make another one of.
+    """Support of `copy.copy`, `copy.deepcopy` and pickle for environments.
 
-    The engine is built anew, its code from the compile cache, and goes on from the same state;
-    whatever else the environment holds is copied with it.
+    A copy has a new engine, with code from the compile cache, and continues from the same state.
+    All other attributes are copied.
     """
 
     _ATTACHED: ClassVar[frozenset[str]] = frozenset()
-    """Attributes that point into the engine: `_attach` makes them."""
+    """Attributes that point into the engine, set by `_attach`."""
 
     options: Options
     _setup_of: tuple[Options | None, Setup] = (None, ())
@@ -41,30 +41,30 @@ class Copies:
         return {name: value for name, value in vars(self).items() if name not in self._ATTACHED}
 
     def __getstate__(self) -> dict[str, Any]:
-        """Attributes for pickle.
+        """Return the attributes for pickle.
 
         Raises:
-            pickle.PicklingError: an option or the task's motion cannot be; names it and the fix.
+            pickle.PicklingError: an option or the task's motion cannot be pickled; with the fix.
         """
         kept = self._kept()
         # These name what is wrong; the spec has it too, without a name.
-        for part in (kept["options"], kept["task"].protocol):
+        for part in (kept["options"], kept["task"].schedule):
             part.__getstate__()
         spec = kept.get("spec")
         return kept if spec is None else kept | {"spec": packed("spec", spec)}
 
     def __setstate__(self, state: Mapping[str, Any]) -> None:
-        """Take what `__getstate__` gave."""
+        """Restore the attributes from `__getstate__`."""
         given = {n: v.value() if isinstance(v, Packed) else v for n, v in state.items()}
         self.__dict__.update(given)
         self._attach()
 
     def __copy__(self) -> Self:
-        """As `copy.deepcopy`: two environments that share an engine would move each other."""
+        """Copy as `copy.deepcopy`, because environments cannot share an engine."""
         return copy.deepcopy(self)
 
     def __deepcopy__(self, memo: dict[int, Any]) -> Self:
-        """An environment that goes on with the same bits, independently."""
+        """Return an independent environment that continues with the same bits."""
         other = type(self).__new__(type(self))
         memo[id(self)] = other
         other.__dict__.update(copy.deepcopy(self._kept(), memo))

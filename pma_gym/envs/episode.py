@@ -1,4 +1,4 @@
-"""What can be read of an episode, from the record that the engine keeps of it."""
+"""Readable state of an episode, from the engine's record."""
 
 import copy
 import math
@@ -23,9 +23,9 @@ NOT_BEGUN = "no episode has begun"
 
 
 class Episode:
-    """What an agent, a controller and a reader see of an environment's episode.
+    """Read-only view of an environment's episode, for agents, controllers and analysis.
 
-    `PMAEnv` and the members of a batch are read by it; it changes nothing.
+    `PMAEnv` and the members of a batch inherit it.
 
     Attributes:
         task: the Task.
@@ -40,9 +40,9 @@ class Episode:
     nominal_plant: Plant
     _engine: Engine
     _index: int = 0
-    """Its number in the engine."""
+    """Index of the environment in the engine."""
     _row: NDArray[np.float64]
-    """Its record."""
+    """The engine's record of the environment."""
     _idle: str | None
 
     def _find_offsets(self) -> None:
@@ -67,12 +67,12 @@ class Episode:
 
     @property
     def pressure(self) -> float:
-        """Gauge pressure that this episode began at (Pa)."""
+        """Gauge pressure at the start of this episode (Pa)."""
         return float(self._engine.pressures[self._index])
 
     @property
     def condition(self) -> Condition:
-        """Where the plant stands; a copy."""
+        """Copy of the plant's present condition."""
         state = np.array([self._number(name) for name in self.nominal_plant.states])
         zero, size = self._number("zero_contraction"), self._number("size")
         return Condition(state, zero, self.time, size, (self.motor_voltage, self.regulator_voltage))
@@ -89,7 +89,7 @@ class Episode:
 
     @property
     def measurement(self) -> Measurement:
-        """What the sensors say, `observation_delay_s` ago."""
+        """The measurement that the agent receives, `observation_delay_s` old."""
         taken = max(self._count - self.options.observation_delay, 0) * self.options.period
         return Measurement(taken, *self._row[self._measured].tolist())
 
@@ -100,33 +100,33 @@ class Episode:
     def truth(self) -> dict[str, float]:
         """True contraction, extension (m), rotation (rad), load (N) and pressure (Pa).
 
-        Contraction is from the muscle's resting length, extension from the trial's beginning;
-        rotation from where the cable begins to be wound in with no load, in an exercise from where
-        it begins.
+        Contraction is relative to the resting length and extension to the trial's start. Rotation
+        is relative to the angle at which an unloaded cable tightens, in an exercise to the trial's
+        start.
         """
         truth = {name: self._number(f"true_{name}") for name in TRUTH}
         return truth | {"extension": self._number(self._datum) - truth["contraction"]}
 
     @property
     def position(self) -> float:
-        """True position that the task asks for (m, rad; N m for a moment's excess)."""
+        """True position of the task's controlled quantity (m, rad; N m for a moment's excess)."""
         truth = self.truth
-        if self.task.protocol.followed.shortens:
+        if self.task.schedule.followed.shortens:
             return truth["contraction"] - self._number(START)
-        if self.task.protocol.followed.is_force:
+        if self.task.schedule.followed.is_force:
             return self._number("excess_nm")
-        return truth[self.task.protocol.quantity]
+        return truth[self.task.schedule.quantity]
 
     @property
     def operator(self) -> Operator | None:
-        """The operator of this exercise; None without one, or before. Not for controllers."""
+        """The exercise's operator; None without one, or before a reset. Not for controllers."""
         if self.task.exercise is None or self._idle == NOT_BEGUN:
             return None
         return Operator(*(self._number(f"operator_{name}") for name in Operator._fields))
 
     @property
     def disturbance(self) -> tuple[float, float]:
-        """What disturbed the last step: the regulator's jump (V) and the hand's force (N)."""
+        """Disturbances in the last step: the regulator's jump (V) and the hand's force (N)."""
         jumps = [name for name in self._offsets if name.startswith("jump_step_")]
         count = self._count - 1
         volts = [
@@ -137,12 +137,12 @@ class Episode:
 
     @property
     def events(self) -> Events:
-        """What disturbs this episode, and when; not for controllers."""
+        """Disturbances of this episode with their times; not for controllers."""
         return self._engine.events(self._index)
 
     @property
     def station(self) -> StationInfo:
-        """What a controller may know, in copies: what it was designed with, how it is driven."""
+        """Station data for controllers, in copies: nominal model, task, pressure and delays."""
         options = self.options
         return StationInfo(
             copy.copy(self._engine.nominal_model),
@@ -155,30 +155,30 @@ class Episode:
 
     @property
     def error(self) -> float:
-        """True position less reference (m or rad)."""
+        """True position minus reference (m or rad)."""
         return self.position - float(self.table.references[self._count])
 
     @property
     def extrapolated(self) -> bool:
-        """Whether the pressure lies outside this task's trials or the model's validity."""
+        """Whether the pressure is outside the range of the task's trials or of the model."""
         return self._number("extrapolated") != 0.0
 
     @property
     def motor_voltage(self) -> float:
-        """Motor voltage that the station received in the last step (V)."""
+        """Motor voltage at the station in the last step (V)."""
         return self._number("motor_voltage")
 
     @property
     def regulator_voltage(self) -> float:
-        """Regulator voltage that the station received in the last step (V)."""
+        """Regulator voltage at the station in the last step (V)."""
         return self._number("regulator_voltage")
 
     @property
     def motor_voltages(self) -> NDArray[np.float64]:
-        """Motor voltage that the station received in every step so far (V), shape (steps,).
+        """Motor voltage at the station in every step so far (V), shape (steps,).
 
         Raises:
-            AttributeError: in an exercise, whose operator is not written down step by step.
+            AttributeError: in an exercise, which does not record the operator's motor.
         """
         if self.task.exercise:
             raise AttributeError(
@@ -191,13 +191,13 @@ class Episode:
 
     @property
     def voltages(self) -> NDArray[np.float64]:
-        """Voltage of the task's actuator that the station received in every step so far (V)."""
+        """Voltage of the task's actuator at the station in every step so far (V)."""
         return self._engine.voltages[: self._count].copy()
 
     @property
     def reference(self) -> Reference:
         """The reference, called with a time (s): extension, contraction (m) or rotation (rad)."""
-        return Reference(self._detached_task.protocol)
+        return Reference(self._detached_task.schedule)
 
     @cached_property
     def _detached_task(self) -> Task:
@@ -205,17 +205,17 @@ class Episode:
         return detached_task(self.task)
 
     def trajectory(self) -> NDArray[np.float64]:
-        """True position (m or rad) at k / 384 s so far, whatever the control rate, shape (k,)."""
+        """True positions (m or rad) at k / 384 s so far, at every control rate, shape (k,)."""
         return self._engine.trace[: math.floor(self._number("sample") + 0.5)].copy()
 
     def episode_summary(self) -> dict[str, Any]:
-        """RMSE of the true position at 384 Hz so far, as the dissertation defines it.
+        """Return the RMSE of the true position at 384 Hz so far, as the dissertation defines it.
 
         Returns:
             `rmse_mm` or `rmse_deg`: over all phases; `rmse_by_phase_mm` or `rmse_by_phase_deg`: of
-            each phase begun, by its name; `percent_of_range`: the first, of 25 mm, 90 deg
-            or the contraction's stroke; `ended_by`: the limit that terminated the episode, in
-            words, or "". An exercise has `exercise_summaries` too, and its RMSE in N m where it
-            prescribes a moment.
+            each phase so far, by name; `percent_of_range`: the first in percent of 25 mm, 90 deg or
+            the contraction's stroke; `ended_by`: the limit that terminated the episode as text, or
+            "". An exercise also has `exercise_summaries`, and its RMSE is in N m if it prescribes a
+            moment.
         """
         return episode_summary(self._engine, self._index)

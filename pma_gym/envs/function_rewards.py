@@ -1,4 +1,4 @@
-"""Rewards by a user's own function, called after every step."""
+"""Rewards from a user's Python function, called after every step."""
 
 import math
 import numbers
@@ -13,29 +13,29 @@ from pma_gym.units import SI_FACTORS
 
 
 class FunctionRewards:
-    """Writes the rewards of a user's function where an engine has its own.
+    """Write the rewards of a user's function into an engine's array of rewards.
 
-    The compiled step leaves the action's change in their place (`ControlStepGraph.reward`). A
-    terminated episode also gets, for every step that it did not reach, the reward of an error of
-    the whole range, as with the rewards by name.
+    The compiled step writes the action's change to this array (`ControlStepGraph.reward`). For
+    every step that a terminated episode did not reach, its reward includes that of an error of the
+    whole range, as with the named rewards.
 
     Args:
-        engine: whose rewards; its options have the function.
+        engine: the engine; its options have the function.
     """
 
     def __init__(self, engine: Engine) -> None:
         task, options = engine.task, engine.options
         assert callable(options.reward)
         self._engine, self._reward, self._scale = engine, options.reward, options.reward_scale
-        unit, quantity = task.protocol.suffix, task.protocol.quantity
+        unit, quantity = task.schedule.suffix, task.schedule.quantity
         self._names = (f"error_{unit}", f"{quantity}_{unit}", f"reference_{unit}")
-        self._span = task.protocol.span / SI_FACTORS[task.protocol.unit]
+        self._span = task.schedule.span / SI_FACTORS[task.schedule.unit]
 
     def write(self, skipped: NDArray[np.int64] | Sequence[int] = ()) -> None:
-        """Compute and write the rewards of the step that was made.
+        """Compute and write the rewards of the last step.
 
         Args:
-            skipped: environments whose step means nothing, since it only begins an episode.
+            skipped: environments without a reward, because the step only began an episode.
         Raises:
             ValueError: the function returned no finite number.
         """

@@ -1,4 +1,4 @@
-"""One environment of a batch, read as a single environment."""
+"""Read access to one environment of a batch, as if it were a single environment."""
 
 import copy
 from collections.abc import Mapping, Sequence
@@ -26,7 +26,7 @@ TOGETHER = "the environments of a batch share one engine"
 
 
 class Batch(Protocol):
-    """What a view of one environment uses of its batch; see `PMAVectorEnv`."""
+    """Interface of a batch for the view of one environment; see `PMAVectorEnv`."""
 
     engine: Engine
     num_envs: int
@@ -43,7 +43,7 @@ class Batch(Protocol):
 
     @property
     def spec(self) -> EnvSpec | None:
-        """How Gymnasium made it."""
+        """Gymnasium's spec of the batch."""
         ...
 
     def reset(
@@ -52,28 +52,27 @@ class Batch(Protocol):
         seed: int | Sequence[int | None] | None = None,
         options: Mapping[str, Any] | None = None,
     ) -> tuple[NDArray[np.float32], dict[str, Any]]:
-        """Begin an episode in every environment, or in those of `reset_mask`."""
+        """Reset every environment, or those of `reset_mask`."""
         ...
 
     _display: Display
 
 
 class BatchMember(PMAEnv):
-    """One environment of a `PMAVectorEnv`: everything that can be read of a `PMAEnv`.
+    """View of one environment of a `PMAVectorEnv`, with all readable attributes of a `PMAEnv`.
 
-    It is a view: it shows the episode that runs in the batch when it is asked. `reset` begins an
-    episode in this environment alone. It has no `step`, since the environments of a batch step
-    together, and takes no attributes.
+    The view shows the batch's present episode. `reset` resets only this environment. There is no
+    `step`, because the environments of a batch step together, and attributes cannot be set.
 
     Args:
         batch: the batch.
-        index: number of the environment, from 0.
+        index: index of the environment, from 0.
     """
 
     _batch: Batch
 
     def __init__(self, batch: Batch, index: int) -> None:
-        """Find the environment's numbers in the batch."""
+        """Find the environment's data in the batch."""
         engine = batch.engine
         block, lane = divmod(index, engine.width)
         # A view takes no attributes, see `__setattr__`.
@@ -98,17 +97,17 @@ class BatchMember(PMAEnv):
 
     @property
     def index(self) -> int:
-        """Its number in the batch."""
+        """Index of the environment in the batch."""
         return self._index
 
     def __setattr__(self, name: str, value: object) -> None:
-        """Take what the class sets; refuse anything else."""
+        """Set an attribute of the class; reject any other."""
         if name not in _OWN:
             raise AttributeError(refusal(name))
         super().__setattr__(name, value)
 
     def set_wrapper_attr(self, name: str, value: object, *, force: bool = True) -> NoReturn:
-        """Refused: see the class."""
+        """Raise an error, because attributes cannot be set."""
         raise AttributeError(refusal(name))
 
     @property
@@ -120,7 +119,7 @@ class BatchMember(PMAEnv):
 
     @property
     def ended_by(self) -> str:  # type: ignore[override]
-        """The limit that terminated the episode, in words, or ""."""
+        """Name of the limit that terminated the episode, or ""."""
         model = self._engine.models[self._index]
         return limit_in_words(model, self._number("ended"), self.task.exercise)
 
@@ -130,13 +129,13 @@ class BatchMember(PMAEnv):
         return self._episode_plant()
 
     def station_info(self) -> dict[str, Any]:
-        """The numbers of `PMAEnv`'s info in the last step or reset."""
+        """The values of `PMAEnv`'s info in the last step or reset."""
         return step_info(self._engine, self._index)
 
     def reset(
         self, *, seed: int | None = None, options: Mapping[str, Any] | None = None
     ) -> tuple[NDArray[np.float32], dict[str, Any]]:
-        """Begin an episode in this environment; the others go on. See `PMAEnv.reset`."""
+        """Reset this environment; the others continue. See `PMAEnv.reset`."""
         check_known("reset option", options or {}, RESET_OPTIONS)
         mask = np.arange(self._batch.num_envs) == self._index
         seeds = [seed if mine else None for mine in mask.tolist()]
@@ -146,7 +145,7 @@ class BatchMember(PMAEnv):
         return observations[self._index].copy(), self.station_info()
 
     def step(self, action: object) -> NoReturn:
-        """Refused: the environments of a batch step together.
+        """Raise an error, because the environments of a batch step together.
 
         Raises:
             RuntimeError: always.
@@ -154,7 +153,7 @@ class BatchMember(PMAEnv):
         raise RuntimeError(f"{TOGETHER} and step together; call step() of the batch")
 
     def get_state(self) -> NoReturn:
-        """Refused: the batch has the state.
+        """Raise an error, because the batch has the state.
 
         Raises:
             RuntimeError: always.
@@ -162,7 +161,7 @@ class BatchMember(PMAEnv):
         raise RuntimeError(f"{TOGETHER}; take the state of the whole batch, by its get_state()")
 
     def set_state(self, state: object) -> NoReturn:
-        """Refused: the batch has the state.
+        """Raise an error, because the batch has the state.
 
         Raises:
             RuntimeError: always.
@@ -170,29 +169,29 @@ class BatchMember(PMAEnv):
         raise RuntimeError(f"{TOGETHER}; put a state into the whole batch, by its set_state()")
 
     def __copy__(self) -> Self:
-        """Another view of the same environment."""
+        """Return another view of the same environment."""
         return type(self)(self._batch, self._index)
 
     def __deepcopy__(self, memo: dict[int, Any]) -> Self:
-        """A view of the same environment in a copy of the batch."""
+        """Return a view of the same environment in a copy of the batch."""
         return type(self)(copy.deepcopy(self._batch, memo), self._index)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """The batch and the number, which a pickle of a view holds."""
+        """Pickle the batch and the index."""
         return type(self), (self._batch, self._index)
 
     def action(self, voltage: float, regulator_voltage: float | None = None) -> NDArray[np.float64]:
-        """The action that commands these voltages (V), see `PMAEnv.action`."""
+        """Return the action for given voltages (V), see `PMAEnv.action`."""
         self._commands.begin(self._number("rest_regulator"))
         return super().action(voltage, regulator_voltage)
 
     @property
     def voltages(self) -> NDArray[np.float64]:
-        """Voltage of the task's actuator in every step so far (V), of a batch that renders."""
+        """Voltage of the task's actuator in every step so far (V); only in a batch that renders."""
         return self._history().voltages
 
     def trajectory(self) -> NoReturn:
-        """Refused: a batch does not keep it.
+        """Raise an error, because a batch does not keep trajectories.
 
         Raises:
             AttributeError: always.
@@ -215,14 +214,14 @@ class BatchMember(PMAEnv):
         return self._batch._display
 
     def close(self) -> None:
-        """Do nothing: the batch has the picture and the threads."""
+        """Do nothing, because the batch owns the picture and the threads."""
 
 
 _OWN = ("_offsets", "_datum", "_measured", "_np_random", "_np_random_seed")
 
 
 def refusal(name: str) -> str:
-    """Why an attribute of an environment in a batch cannot be set, and what can be done."""
+    """Message on an attribute of a batch's environment that cannot be set, with the fix."""
     return (
         f"attribute {name!r} cannot be set: {TOGETHER}, and have no attributes of their own; give "
         "options when the environments are made, and pressure_kpa by set_options() before reset()"

@@ -1,4 +1,4 @@
-"""The environment: a task on a plant, seen through the plant's sensors."""
+"""The environment `PMAEnv`: a task on a plant, observed through the plant's sensors."""
 
 from collections.abc import Callable, Mapping
 from typing import Any, Unpack
@@ -31,19 +31,19 @@ from pma_gym.metrics import SAMPLE_RATE_HZ
 from pma_gym.tasks import Task
 
 OWN = ("task", "render_mode", "render_width")
-"""Keyword arguments of an environment beside the options."""
+"""Keyword arguments of an environment in addition to the options."""
 
 RESET_OPTIONS = ("pressure_kpa",)
 
 
 class PMAEnv(Copies, SeededByReset, Episode, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
-    """Tracking with a pneumatic muscle that a servo drive pulls through a cable.
+    """Track a reference with a pneumatic muscle that a servo drive pulls through a cable.
 
-    In every control step kT the agent commands a voltage, which is held until (k+1)T; a position is
-    to follow the task's reference. An episode begins settled.
+    At every control step kT the agent commands a voltage, which is constant until (k+1)T. The
+    controlled position should follow the task's reference. An episode begins in equilibrium.
 
     ## Tasks
-    | task | what follows what | actuator |
+    | task | controlled quantity and its reference | actuator |
     |---|---|---|
     | `displacement` | the muscle's extension: 5 mm/s for 5 s | motor |
     | `rotation` | the pulley's rotation: 0-90 deg in 5 s, held 5 s, back in 5 s | motor |
@@ -52,33 +52,33 @@ class PMAEnv(Copies, SeededByReset, Episode, gym.Env[NDArray[np.float32], NDArra
     | `isotonic` | contraction: 12.5 mm in 2.5 s, held 2.5 s, back in 2.5 s | regulator |
     | `triangle_low` | contraction: 11.4 mm up and down in 4 s, three times | regulator |
     | `triangle_high` | contraction: 5.5 mm up and down in 10 s, three times | regulator |
-    | `isokinetic_exercise` | an operator's joint: 0-90 deg in 5 s, held, back | regulator |
-    | `isotonic_exercise` | the moment at his joint: 8 N m | regulator |
-    | `profile_exercise` | the moment at his joint, by its angle | regulator |
+    | `isokinetic_exercise` | an operator's joint angle: 0-90 deg in 5 s, held, back | regulator |
+    | `isotonic_exercise` | moment at the operator's joint: 8 N m | regulator |
+    | `profile_exercise` | moment at the operator's joint, as a function of angle | regulator |
 
-    The motor's tasks begin with no load at a pressure that the regulator holds. The regulator's
-    begin under a load that the motor holds (200, 150 and 400 N), by the voltage that the nominal
-    drive needs for it; contraction counts from there. In an exercise the motor plays an operator
-    (`pma_gym.tasks.operator`) with a leg on the lever, and the regulator resists him; a moment
-    other than 8 N m comes by name: `isotonic_exercise_6.5`. Drawn references come by number too:
-    `displacement_speeds_17` is that of seed 17. A `Task` of one's own, such as
-    `pma_gym.tasks.following` makes of a function, can be given instead of a name.
+    Tasks of the motor begin without load, at a pressure that the regulator holds. Tasks of the
+    regulator begin under a load that the motor holds (200, 150 and 400 N) with the voltage of the
+    nominal drive; contraction counts from there. In an exercise the motor simulates an operator
+    (`pma_gym.tasks.operator`) with a leg on the lever, and the regulator resists. A suffix sets
+    another moment than 8 N m, `isotonic_exercise_6.5`, or the seed of a drawn reference,
+    `displacement_speeds_17`. Instead of a name you can pass a `Task`, for example one that
+    `pma_gym.tasks.following` makes from a function.
 
     ## Action
-    A Box of shape (1,), or (2,) with `regulator_action`; beyond -1 to 1 it is held there.
+    A Box of shape (1,), or (2,) with `regulator_action`; values are clipped to -1 to 1.
 
     | index | meaning | range | physical |
     |---|---|---|---|
     | 0 | voltage of the task's actuator | -1 to 1 | 0 to 10 V |
     | 1, only with `regulator_action` | regulator voltage | -1 to 1 | 0 to 10 V |
 
-    `action(volts)` gives the action of a voltage.
+    `action(volts)` returns the action for a voltage.
 
     ## Observation
-    A float32 Box, each entry clipped to -5 to 5. "Position" is the quantity that the task asks
-    for, and its range 25 mm, 90 deg, or the contraction's stroke. Extension and rotation count from
-    the trial's beginning, so that extension is negative while a regulator's task contracts the
-    muscle. `observation_delay_s` is the age of everything measured.
+    A float32 Box, each entry clipped to -5 to 5. "Position" is the task's controlled quantity; its
+    range is 25 mm, 90 deg, or the contraction's stroke. Extension and rotation count from the
+    trial's start, so that extension is negative while a regulator's task contracts the muscle.
+    All measured values are `observation_delay_s` old.
 
     | index | entry | 1.0 = |
     |---|---|---|
@@ -90,17 +90,17 @@ class PMAEnv(Copies, SeededByReset, Episode, gym.Env[NDArray[np.float32], NDArra
     | 5 | reference now less measured position | range |
     | next `preview` | reference 1, 2... control steps ahead | range |
     | next 1 or 2 | last action | 10 V, -1.0 = 0 V |
-    | next `history` | position heard 1, 2... control steps before | range |
+    | next `history` | measured position 1, 2... control steps before | range |
 
-    Where an exercise prescribes a moment, 4 is the moment prescribed at the measured angle, 5 that
-    less the measured one, and the position heard before is the moment's excess; the range is the
-    greatest moment prescribed, and there is no preview.
+    If an exercise prescribes a moment, entry 4 is the moment prescribed at the measured angle,
+    entry 5 is that minus the measured moment, and the history contains the moment's excess. The
+    range is the largest prescribed moment, and there is no preview.
 
-    `table.describe()` prints the table of the options in use.
+    `table.describe()` prints this table for the options in use.
 
     ## Reward
-    By name, of the true error e at the end of the step in percent of the range, and of the
-    largest change da of an action since the step before:
+    By name, from the true error e at the end of the step (percent of the range) and the largest
+    change da of an action since the previous step:
 
     | name | reward of a step |
     |---|---|
@@ -109,11 +109,10 @@ class PMAEnv(Copies, SeededByReset, Episode, gym.Env[NDArray[np.float32], NDArra
     | `gaussian` | exp(-e^2), 0 where e^2 is 12 or more |
     | `smooth` | -abs(e) - 0.1 abs(da) |
 
-    A terminated episode also gets, for every step until truncation that it did not reach, the
-    reward of e = 100.
-    `reward_scale` multiplies all of it.
+    After termination, the last reward includes the reward of e = 100 for every step that remained
+    until truncation. `reward_scale` multiplies the whole reward.
 
-    `reward` may also be a function, which Python calls after every step with four floats: e, da,
+    `reward` may also be a Python function. It is called after every step with four floats: e, da,
     the true position and its reference, in the unit of the info (mm, deg or N m). It returns a
     finite number: `def reward(error_percent, action_change, position, reference): ...`
 
@@ -127,46 +126,46 @@ class PMAEnv(Copies, SeededByReset, Episode, gym.Env[NDArray[np.float32], NDArra
     | cable tension | 1300 N |
     | pressure | 600 kPa |
 
-    An exercise also ends where moment (24 N m) or speed of the joint (60 deg/s) are not safe. Its
-    safety layer (`safety`, on by default; `pma_gym.tasks.safety_filter`) holds the regulator's
-    command away from there.
+    An exercise also ends beyond a safe moment (24 N m) or joint speed (60 deg/s). Its safety filter
+    (`safety`, on by default; `pma_gym.tasks.safety_filter`) limits the regulator's command to
+    prevent this.
 
-    `truncated` once the last sample of the trial at 384 Hz, 1922/384 s after its last phase began,
-    is reached: at 100 Hz after 501 steps (displacement), 1501 (rotation), 1001 (the unseen
+    `truncated` at the last sample of the trial at 384 Hz, 1922/384 s after the start of its last
+    phase: at 100 Hz after 501 steps (displacement), 1501 (rotation), 1001 (the unseen
     references), 751 (isotonic), 1201 or 3001 (triangles), 1501 (exercises). `max_episode_steps`
-    truncates earlier, with the same last info.
+    truncates earlier, also with the summary in the last info.
 
     ## Disturbances
-    By name, `disturbances`; drawn at every reset, at random times, by the environment's seed:
+    By name, `disturbances`; their random times follow from the environment's seed at every reset:
 
-    | name | what comes, every 2.5 s on average |
+    | name | disturbance, every 2.5 s on average |
     |---|---|
     | `none` (default) | |
     | `regulator` | the regulator's pressure jumps by 25 kPa, away from its line and back in turn |
-    | `hand_push` | somebody at the slide pulls or pushes with 50 N, for 0.2 to 0.8 s at a time |
+    | `hand_push` | a hand pulls or pushes the slide with 50 N, for 0.2 to 0.8 s at a time |
     | `regulator_and_hand_push` | both |
 
-    A jump adds volts to the regulator's command, by the nominal line and as far as
-    0-10 V go; the hand's force adds to the muscle's at the slide. Both come with the control
-    step after their time. `env.disturbance` and `env.events` tell, but not controllers.
+    A jump adds a voltage to the regulator's command, by the nominal line and within 0-10 V. The
+    hand's force adds to the muscle's at the slide. Both act from the control step after their time.
+    `env.disturbance` and `env.events` return them for analysis; controllers do not receive them.
 
     ## Info
     | key | value | unit |
     |---|---|---|
     | `time_s` | since the trial began | s |
     | `extension_mm`, `rotation_deg` or `contraction_mm` | true position | mm, deg |
-    | `measured_` and the same | as the agent receives it | mm, deg |
+    | `measured_` + the same | position as the agent receives it | mm, deg |
     | `reference_mm` or `reference_deg` | reference now | mm, deg |
-    | `error_mm` or `error_deg` | true position less reference | mm, deg |
-    | `motor_voltage_v`, `regulator_voltage_v` | as the station receives it in this step | V |
+    | `error_mm` or `error_deg` | true position minus reference | mm, deg |
+    | `motor_voltage_v`, `regulator_voltage_v` | commands at the station in this step | V |
     | `pressure_kpa`, `load_n` | true gauge pressure and cable tension | kPa, N |
     | `extrapolated` | pressure outside the dissertation's trials or the model's validity | |
-    | of an exercise: `moment_nm`, `operator_nm` | at the joint; that the operator means | N m |
-    | `speed_deg_s`, `power_w` | of the joint; that it gives the device | deg/s, W |
+    | exercise: `moment_nm`, `operator_nm` | moment at the joint; intended by the operator | N m |
+    | `speed_deg_s`, `power_w` | speed of the joint; its power into the device | deg/s, W |
     | if it prescribes a moment: `rotation_deg`, `prescribed_nm` | angle, moment | deg, N m |
-    | and `excess_nm` for the position, `_nm` for `_mm` | moment less prescribed | N m |
+    | and `excess_nm` for the position, `_nm` for `_mm` | moment minus prescribed moment | N m |
     | at the end: `rmse_mm`, `rmse_deg` or `rmse_nm`, ... | see `episode_summary` | |
-    | at the end: `ended_by` | the limit that terminated the episode, in words, else "" | |
+    | at the end: `ended_by` | name of the limit that terminated the episode, else "" | |
 
     ## Reset options
     `reset(options={"pressure_kpa": 300})` sets the pressure of one episode, as the keyword does.
@@ -179,7 +178,7 @@ class PMAEnv(Copies, SeededByReset, Episode, gym.Env[NDArray[np.float32], NDArra
     Args:
         task: name of a task, or a Task.
         render_mode: None; `rgb_array`: `render` returns a picture; or `human`: a window (pygame,
-            extra `view`) shows `reset` and every step at real time, until its user closes it.
+            extra `view`) shows `reset` and every step in real time, until the user closes it.
         render_width: width of the pictures (pixels), a multiple of 4; they are half as high.
         options: keyword arguments, see `Options`.
 
@@ -189,9 +188,9 @@ class PMAEnv(Copies, SeededByReset, Episode, gym.Env[NDArray[np.float32], NDArra
         table: the ObservationTable.
         nominal_plant: the Plant of the nominal model.
         plant: the Plant of this episode; differs from the nominal one with `randomisation`.
-        condition: where the plant stands.
-        pressure: gauge pressure that this episode began at (Pa).
-        ended_by: the limit that terminated the episode, in words; "" while none has.
+        condition: present condition of the plant.
+        pressure: gauge pressure at the start of this episode (Pa).
+        ended_by: name of the limit that terminated the episode; "" if none has.
         horizon: control steps after which an episode is truncated.
 
     Example:
@@ -258,8 +257,8 @@ class PMAEnv(Copies, SeededByReset, Episode, gym.Env[NDArray[np.float32], NDArra
         """Begin a trial: draw the pressure and the station, pressurise, settle, zero the sensors.
 
         Args:
-            seed: seed of everything random in the episodes from here on.
-            options: may hold `pressure_kpa` for this episode.
+            seed: seed of all random numbers in this and the following episodes.
+            options: may contain `pressure_kpa` for this episode.
         Raises:
             TypeError: an unknown option.
             ValueError: a pressure out of range.
@@ -281,11 +280,11 @@ class PMAEnv(Copies, SeededByReset, Episode, gym.Env[NDArray[np.float32], NDArra
     def step(
         self, action: NDArray[np.floating]
     ) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
-        """Command the station, let one control step pass, return its result.
+        """Apply an action for one control step and return the result.
 
         Raises:
             ValueError: an action of the wrong shape, or not finite.
-            gymnasium.error.ResetNeeded: no episode, or one that has ended.
+            gymnasium.error.ResetNeeded: no episode has begun, or it has ended.
         """
         made = self._advance(action)
         return made if type(made) is tuple else self._otherwise(action, made)
@@ -358,9 +357,9 @@ class PMAEnv(Copies, SeededByReset, Episode, gym.Env[NDArray[np.float32], NDArra
     # -- states ------------------------------------------------------------------------------------
 
     def get_state(self) -> EnvState:
-        """All that the environment needs to go on from here with the same bits, as a value.
+        """Return the state from which the environment continues with the same bits.
 
-        Before the first `reset` too: then it is the state of an environment that waits for it.
+        It works before the first `reset` too.
         """
         begun, ended = self._idle != NOT_BEGUN, self._idle not in (NOT_BEGUN, None)
         return EnvState(
@@ -374,14 +373,14 @@ class PMAEnv(Copies, SeededByReset, Episode, gym.Env[NDArray[np.float32], NDArra
         )
 
     def set_state(self, state: EnvState) -> None:
-        """Go on from a state, of this environment or of another one that was made as this.
+        """Continue from a state of this environment or of one with the same arguments.
 
         Args:
-            state: what `get_state` gave.
+            state: result of `get_state`.
         Raises:
-            TypeError: no state.
-            StateError: a state of another task, other options or another model, naming what
-                differs; or a damaged one. Nothing has changed then.
+            TypeError: not a state.
+            StateError: a damaged state, or one with another task, options or model, with the
+                differences. The environment is unchanged then.
         """
         state = check_state(state, self._setup, 1)
         put(self._engine, state.simulation)
@@ -404,17 +403,17 @@ class PMAEnv(Copies, SeededByReset, Episode, gym.Env[NDArray[np.float32], NDArra
         return self._engine.horizon
 
     def limit_steps(self, steps: int) -> None:
-        """Truncate after so many control steps, or at the task's end if that comes first.
+        """Truncate after a number of control steps, or at the task's end if that comes first.
 
-        `gym.make(id, max_episode_steps=steps)` calls it, so that the last info of an episode has
-        the episode's summary.
+        `gym.make(id, max_episode_steps=steps)` calls it, so that the last info of an episode
+        contains the summary.
         """
         self._engine.limit_steps(steps)
         self.options = self._engine.options
 
     @property
     def spec(self) -> EnvSpec | None:
-        """How Gymnasium made it: with plain arguments and the true number of steps, for JSON."""
+        """Gymnasium's spec with JSON arguments and the true number of steps."""
         return self.__dict__.get("spec")
 
     @spec.setter
@@ -424,22 +423,22 @@ class PMAEnv(Copies, SeededByReset, Episode, gym.Env[NDArray[np.float32], NDArra
     # -- actions and pictures ----------------------------------------------------------------------
 
     def action(self, voltage: float, regulator_voltage: float | None = None) -> NDArray[np.float64]:
-        """The action that commands these voltages (V), held to 0-10 V.
+        """Return the action for given voltages (V), limited to 0-10 V.
 
-        In float64, which `step` takes as it is: float32 would move a voltage by up to 0.3 uV.
+        It is float64, which `step` uses unchanged; float32 would change a voltage by up to 0.3 uV.
 
         Args:
             voltage: command (V) of the task's actuator: motor or regulator.
-            regulator_voltage: regulator command (V), with `regulator_action`; if not given, the
-                one that holds the pressure of the episode's start.
+            regulator_voltage: regulator command (V), with `regulator_action`; by default the one
+                that holds the initial pressure of the episode.
         """
         return self._commands.action_for(voltage, regulator_voltage)
 
     def render(self) -> NDArray[np.uint8] | None:  # type: ignore[override]
-        """A picture of the station and of the trial so far, RGB.
+        """Return a picture of the station and of the trial so far, RGB.
 
         Returns:
-            Shape (render_width / 2, render_width, 3); None where a window shows it
+            Shape (render_width / 2, render_width, 3); None if a window shows it
             (`render_mode="human"`).
 
         Raises:
@@ -459,7 +458,7 @@ class PMAEnv(Copies, SeededByReset, Episode, gym.Env[NDArray[np.float32], NDArra
         return None
 
     def picture(self) -> NDArray[np.uint8]:
-        """The picture that `render` gives, whatever the render mode."""
+        """Return the picture of `render` in every render mode."""
         if self._idle == NOT_BEGUN:
             raise self._needs_reset("render()")
         return self._display.draw(self, self._history())

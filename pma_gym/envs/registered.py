@@ -1,4 +1,4 @@
-"""Registered ids where a batch is made without `gym.make_vec`."""
+"""Registered ids in place of task names, for a batch made without `gym.make_vec`."""
 
 import importlib
 from collections.abc import Mapping
@@ -15,7 +15,7 @@ OURS = (PMAEnv, PMAVectorEnv)
 
 
 def is_id(task: object) -> TypeGuard[str]:
-    """Whether a task is given by a registered environment's id instead of its name.
+    """Whether a task is a registered environment's id and not a task's name.
 
     >>> [is_id(name) for name in ("displacement", "pma_gym/IsokineticRotation-v0")]
     [False, True]
@@ -24,13 +24,11 @@ def is_id(task: object) -> TypeGuard[str]:
 
 
 def registered(task: str, options: Mapping[str, Any]) -> tuple[EnvSpec, dict[str, Any]]:
-    """What a registered id stands for.
+    """Return the spec and the keyword arguments of a registered id.
 
     Args:
         task: the id, with or without the module that registers it: `pma_gym:pma_gym/Name-v0`.
         options: options that replace or add to the registered ones.
-    Returns:
-        Its specification, and the keyword arguments of its batch.
     Raises:
         gymnasium.error.Error: an unknown id.
         ModuleNotFoundError: the module in front of the id cannot be imported.

@@ -1,4 +1,4 @@
-"""Gymnasium's `np_random` and `np_random_seed` for episodes that draw by a counter."""
+"""Gymnasium's `np_random` and `np_random_seed` for episodes with counter-based random numbers."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -7,22 +7,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 SEEDS = 1 << 31
-"""Seeds are drawn below this number, which fits every library's integers."""
+"""Upper bound of drawn seeds, which fits the integers of all libraries."""
 
 
 class SeededByReset:
-    """Everything random in an episode follows from the seed that `reset` was given last.
+    """Derive all random numbers of an episode from the seed of the last `reset`.
 
-    Compiled code draws by that seed, the episode's number and the step's, and never from
-    `np_random`: that generator begins anew with each seed, and is there for wrappers and users. A
-    generator that is set as `np_random` gives the seed of the next `reset` that is given none.
+    Compiled code computes them from the seed, the episode's number and the step's, and never draws
+    from `np_random`. That generator restarts with each seed and serves wrappers and users. A
+    generator assigned to `np_random` provides the seed of the next `reset` without a seed.
     """
 
     _drawn: int | None = None
 
     @property
     def np_random(self) -> np.random.Generator:
-        """A generator of the last seed, for wrappers and users; episodes do not draw from it."""
+        """Generator with the last seed, for wrappers and users; episodes do not draw from it."""
         return super().np_random  # type: ignore[misc]
 
     @np_random.setter
@@ -48,14 +48,14 @@ def own_seeds(
     indices: NDArray[np.int64],
     first: int | None,
 ) -> list[int | None]:
-    """The seeds that environments of a batch begin anew with, None for those that go on.
+    """Return the seeds of a batch's environments at a reset, None for those that keep their seed.
 
     Args:
-        given: of every environment, the seed that a reset was given, or None.
-        known: of every environment, the seed that it goes by so far, or None.
-        indices: which environments the reset is for.
-        first: seed of the first environment, the others counting up from it, where nobody gave any;
-            None to draw one for each.
+        given: for every environment, the seed given to the reset, or None.
+        known: for every environment, its present seed, or None.
+        indices: the environments of the reset.
+        first: seed of the first environment, with consecutive seeds for the others, if no seeds are
+            given or known; None to draw one for each.
     Returns:
         Seeds in the order of indices.
 
@@ -73,6 +73,6 @@ def own_seeds(
 
 
 def drawn_seed() -> int:
-    """A seed that nobody chose, from the operating system."""
+    """Draw a seed from the operating system."""
     entropy: Any = np.random.SeedSequence().entropy
     return int(entropy)

@@ -1,4 +1,4 @@
-"""The task, options and model of an environment as text that can be compared and stored."""
+"""The task, options and model of an environment as text, for comparison and storage."""
 
 import hashlib
 import re
@@ -17,13 +17,13 @@ from pma_gym.plant.model import Model
 from pma_gym.tasks import Task
 
 Setup = tuple[tuple[str, str], ...]
-"""Names and values: the task, the options, the model's parameters."""
+"""Names and values of the task, the options and the model's parameters."""
 
 SINGLE = "a PMAEnv"
-"""Text of `num_envs` of an environment that is no batch."""
+"""Text of `num_envs` for a single environment."""
 
 FEW = 4
-"""Differences that a message names."""
+"""Largest number of differences in a message."""
 
 _RENAMED = {
     "Human": "Operator",
@@ -31,7 +31,7 @@ _RENAMED = {
     "Guard": "SafetyFilter",
     "guard": "safety_filter",
 }
-"""Names of classes and fields in the texts of states that earlier versions saved."""
+"""Earlier names of classes and fields in saved states, with the present names."""
 
 _RENAMED_NUMBERS = {
     "memory_operator": "memory_hand_push",
@@ -40,7 +40,7 @@ _RENAMED_NUMBERS = {
     "told": "nominal",
     "guard": "safety",
 }
-"""Beginnings of the names of numbers in these states."""
+"""Earlier prefixes of names of numbers in saved states, with the present prefixes."""
 
 _OPTIONS = {
     # The nominal model stands elsewhere, number by number, wherever it was read from.
@@ -48,7 +48,7 @@ _OPTIONS = {
     for field in fields(Options)
     if field.name not in ("model", "pressure_kpa")
 }
-"""Options that a setup names, and their defaults."""
+"""Options in a setup, with their defaults."""
 
 _OLD_NAME = re.compile(rf"\b({'|'.join(_RENAMED)})(?=[{{:])")
 _OLD_NUMBER = re.compile(rf"\b({'|'.join(_RENAMED_NUMBERS)})(?=_| |$)")
@@ -56,7 +56,7 @@ _ADDRESS = re.compile(r" at 0x[0-9a-fA-F]+")
 
 
 def setup(engine: Engine, **others: object) -> Setup:
-    """What decides how an engine's environments go on from a state.
+    """Return everything that the continuation from a state depends on.
 
     Args:
         engine: the engine.
@@ -75,7 +75,7 @@ def setup(engine: Engine, **others: object) -> Setup:
 
 
 def with_new_names(saved: Mapping[str, Any]) -> Setup:
-    """What a saved state was made with, old names in it replaced, with one deprecation warning.
+    """Replace earlier names in a saved setup, with one deprecation warning.
 
     >>> with_new_names({"operator": "Operator{strength: 200.0}"})
     (('operator', 'Operator{strength: 200.0}'),)
@@ -100,7 +100,7 @@ def with_new_names(saved: Mapping[str, Any]) -> Setup:
 
 
 def with_new_options(saved: Setup) -> Setup:
-    """A setup with the default of each option that did not exist yet when it was saved.
+    """Add the defaults of options that are newer than a saved setup.
 
     >>> dict(with_new_options((("noise", "False"),)))["memory_at_start"]
     'None'
@@ -117,7 +117,7 @@ def with_new_options(saved: Setup) -> Setup:
 
 
 def differences(theirs: Setup, ours: Setup) -> str:
-    """What two environments were made with differently, in words; empty if nothing.
+    """Describe the differences between two setups; empty if there are none.
 
     >>> differences((("num_envs", "2"), ("noise", "True")), (("num_envs", "2"), ("noise", "False")))
     'noise is True there and False here'

@@ -1,9 +1,9 @@
-"""What Gymnasium's specs say of these environments: their number of steps, plain arguments.
+"""Gymnasium's specs of the environments: the number of steps, and arguments for JSON.
 
-Gymnasium puts a TimeLimit of the registered number of steps around what `gym.make` makes. An
-environment truncates by itself, and with other options after another number of steps, so that this
-wrapper would cut episodes short. `own_time_limit` takes it off again; a number of steps that the
-user asks for becomes the environment's own.
+`gym.make` adds a TimeLimit wrapper with the registered number of steps. The environments truncate
+episodes on their own, after a number of steps that depends on the options, so this wrapper would
+shorten episodes. `own_time_limit` removes it. A number of steps from the user becomes the
+environment's limit.
 """
 
 from dataclasses import replace
@@ -17,19 +17,19 @@ from pma_gym.engine.plain_values import plain_options
 
 
 class SingleEnvWrappers(tuple[WrapperSpec, ...]):
-    """Wrappers that `gym.make` applies and that `gym.make_vec` takes for none.
+    """Wrappers that `gym.make` applies and `gym.make_vec` ignores.
 
-    `make` goes through them. `make_vec` refuses to make a batch of an id with wrappers, by their
-    number; but a batch has its own number of steps and needs none of these.
+    `make` iterates over them. `make_vec` rejects ids with wrappers, by their number; but a batch
+    has its own limit and needs none of these, so the number is 0.
     """
 
     def __len__(self) -> int:
-        """None that a batch would miss."""
+        """Return 0: a batch needs no wrappers."""
         return 0
 
 
 def single_wrappers(steps: int) -> SingleEnvWrappers:
-    """The wrappers of a spec whose options give so many steps."""
+    """Return the wrappers of a spec with a number of steps."""
     default = {"default": DefaultSteps(steps)}
     return SingleEnvWrappers(
         (WrapperSpec("own_time_limit", f"{__name__}:own_time_limit", default),)
@@ -39,12 +39,12 @@ def single_wrappers(steps: int) -> SingleEnvWrappers:
 def own_time_limit(env: gym.Env[Any, Any], default: int) -> gym.Env[Any, Any]:
     """Replace the TimeLimit around an environment by the environment's own limit.
 
-    `gym.make` calls it as it calls a wrapper.
+    `gym.make` calls it like a wrapper.
 
     Args:
-        env: what `gym.make` has made so far.
-        default: number of steps that the spec's options gave; of type DefaultSteps unless the spec
-            was read from JSON, where only the value can tell it from a user's number.
+        env: environment that `gym.make` has made so far.
+        default: number of steps from the spec's options. Its type is DefaultSteps, except in a spec
+            from JSON, where only the value distinguishes it from a user's number.
     """
     inner: Any = env.unwrapped
     own = inner.horizon
@@ -60,10 +60,10 @@ def own_time_limit(env: gym.Env[Any, Any], default: int) -> gym.Env[Any, Any]:
 
 
 def completed_spec(spec: EnvSpec | None, horizon: int) -> EnvSpec | None:
-    """A spec with plain arguments, for JSON, and with the true number of steps.
+    """Return a spec with JSON arguments and the true number of steps.
 
     Args:
-        spec: as Gymnasium wrote it.
+        spec: Gymnasium's spec.
         horizon: control steps after which an episode is truncated.
     """
     if spec is None:

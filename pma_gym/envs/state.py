@@ -11,25 +11,25 @@ from pma_gym.envs.setup import Setup, differences, with_new_names, with_new_opti
 from pma_gym.envs.state_models import model_document, parse_model_document
 
 FORM = "pma-gym environment state 1"
-"""First entry of a state in JSON: what it is, and which form it has."""
+"""First entry of a state in JSON: its type and format version."""
 
 
 class EnvState(NamedTuple):
-    """All that an environment needs to go on with the same bits.
+    """State of an environment, from which it continues with the same bits.
 
-    `get_state()` of `PMAEnv` and `PMAVectorEnv` gives one, `set_state(state)` takes it. A state is
-    immutable, can be compared and pickled, and is text by `to_json`. It holds nothing of a policy
-    and nothing of the spaces, whose `sample` has a generator of its own.
+    `get_state()` of `PMAEnv` and `PMAVectorEnv` returns one; `set_state(state)` restores it. A
+    state is immutable, can be compared and pickled, and `to_json` writes it as text. It contains no
+    data of a policy or of the spaces, whose `sample` uses a separate generator.
 
     Attributes:
-        setup: the task, the options and the model that it belongs to, as names and texts.
+        setup: its task, options and model, as names and texts.
         simulation: the numbers of the simulation.
-        begun: of every environment whether it has begun an episode, bool as bytes.
-        ended: of every environment whether its episode has ended, bool as bytes.
-        ended_by: the limit that ended a single environment's episode, in words, or None.
-        seeds: of every environment the seed that it was reset with, None before.
-        generator: state of `np_random`: the PCG64's state and increment, whether it has a 32-bit
-            number left, and that number; None where there is no generator yet.
+        begun: whether each environment has begun an episode, bool as bytes.
+        ended: whether the episode of each environment has ended, bool as bytes.
+        ended_by: name of the limit that ended a single environment's episode, or None.
+        seeds: seed of each environment's last reset, None before.
+        generator: state of `np_random`: the PCG64's state and increment, whether a 32-bit number is
+            buffered, and that number; None if there is no generator yet.
 
     Example:
         >>> from pma_gym.envs import PMAEnv
@@ -52,11 +52,11 @@ class EnvState(NamedTuple):
     generator: tuple[int, int, int, int] | None
 
     def spread(self, setup: Setup, count: int) -> "EnvState":
-        """The state of so many environments that all stand where this single one does.
+        """Return the state of a batch in which every environment has this single state.
 
         Args:
-            setup: what they were made with.
-            count: how many they are.
+            setup: setup of the batch.
+            count: number of environments.
         """
         one = self.simulation
         simulation = Snapshot(
@@ -73,7 +73,7 @@ class EnvState(NamedTuple):
         return EnvState(setup, simulation, *flags, None, self.seeds * count, self.generator)
 
     def to_json(self) -> str:
-        """The state as JSON text; arrays stand in it as base64."""
+        """Return the state as JSON text, with arrays in base64."""
         simulation: dict[str, Any] = {
             name: _encoded(value)
             for name, value in self.simulation._asdict().items()
@@ -94,10 +94,10 @@ class EnvState(NamedTuple):
 
     @classmethod
     def from_json(cls, text: str) -> "EnvState":
-        """A state from the text that `to_json` gave; nothing in it is run.
+        """Read a state from the text of `to_json`; nothing in the text is executed.
 
         Raises:
-            StateError: text that is no state; says where.
+            StateError: invalid text, with the place of the error.
         """
         try:
             document = json.loads(text)
@@ -136,16 +136,16 @@ class EnvState(NamedTuple):
 
 
 def check_state(state: object, ours: Setup, count: int) -> EnvState:
-    """A state, if it is one of environments that were made as these.
+    """Check that a state fits these environments, and return it.
 
     Args:
-        state: what came.
-        ours: what these were made with.
-        count: how many there are.
+        state: the value to check.
+        ours: setup of these environments.
+        count: number of environments.
     Raises:
-        TypeError: no state.
-        StateError: one of another task, of other options or another model, with all that differs;
-            or a damaged one.
+        TypeError: not a state.
+        StateError: a damaged state, or one with another task, options or model, with the
+            differences.
     """
     if not isinstance(state, EnvState):
         raise TypeError(
@@ -189,7 +189,7 @@ def _is_seed(seed: object) -> bool:
 
 
 def generator_state(generator: np.random.Generator | None) -> tuple[int, int, int, int] | None:
-    """The numbers of Gymnasium's generator, which is a PCG64."""
+    """Return the state of Gymnasium's generator, a PCG64, as numbers."""
     if generator is None:
         return None
     state: Any = generator.bit_generator.state
@@ -200,7 +200,7 @@ def generator_state(generator: np.random.Generator | None) -> tuple[int, int, in
 def generator_at(
     numbers: tuple[int, int, int, int] | None, present: np.random.Generator | None
 ) -> np.random.Generator | None:
-    """A generator that goes on from these numbers: the present one, if there is any."""
+    """Return a generator with a given state; the present one is reused if there is one."""
     if numbers == generator_state(present):
         return present
     if numbers is None:

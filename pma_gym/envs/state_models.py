@@ -1,4 +1,4 @@
-"""Models of drawn stations as plain documents: exact in SI, where files for people round."""
+"""Models of randomised stations as exact documents in SI; model files round their numbers."""
 
 import math
 from collections.abc import Mapping
@@ -12,11 +12,11 @@ from pma_gym.plant.parameter_rows import Note
 from pma_gym.units import Quantity
 
 ROUNDING = 1e-9
-"""Share of a bound by which a parameter may lie beyond it: units are converted to SI and back."""
+"""Relative tolerance of a parameter's bounds, for the conversion to SI and back."""
 
 
 def model_document(model: Model) -> dict[str, Any]:
-    """A model as numbers and texts, parameters in SI by effect and field."""
+    """Return a model as numbers and texts, with parameters in SI by effect and field."""
     return {
         "name": model.name,
         "title": model.title,
@@ -27,11 +27,11 @@ def model_document(model: Model) -> dict[str, Any]:
 
 
 def parse_model_document(document: Mapping[str, Any]) -> Model:
-    """The model of a document that `model_document` gave.
+    """Make a model from a document of `model_document`.
 
     Raises:
         StateError: an unknown effect or parameter, or a value out of its bounds.
-        ModelError: effects that make no plant.
+        ModelError: effects that do not form a plant.
     """
     tables, kept = (with_present_names(document[key]) for key in ("parameters", "notes"))
     parameters = {name: _parameters(name, p) for name, p in tables.items()}

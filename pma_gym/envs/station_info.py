@@ -1,53 +1,54 @@
-"""What a controller receives: the station before a trial, a measurement in every control step.
+"""Inputs of a controller: the station's data before a trial, a measurement in every control step.
 
-All of it is detached: copies that hold no environment, so that neither the true state nor anything
-that the simulation reads can be reached or changed through them.
+They are detached copies without a reference to the environment. Through them a controller can
+neither read the true state nor change the simulation.
 """
 
 import copy
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from pma_gym.data.protocol import Protocol
+from pma_gym.data.trial_schedule import TrialSchedule
 from pma_gym.engine.nominal_rig import rest_load
 from pma_gym.plant.model import Model
-from pma_gym.renamed_names import renamed_names
+from pma_gym.renamed_names import renamed_attribute, renamed_names
 from pma_gym.tasks import Task
 
 
 @dataclass(frozen=True, slots=True)
 class Reference:
-    """The reference of a trial, to be called with a time (s) since the trial began.
+    """The reference of a trial as a function of the time (s) since its start.
 
-    It returns extension or contraction (m) or rotation (rad), past and future; where an exercise
-    prescribes a moment, the moment's excess (N m), which is to be 0.
+    It returns extension or contraction (m) or rotation (rad), for past and future times. If an
+    exercise prescribes a moment, the reference is that of the moment's excess (N m), which is 0.
 
     Attributes:
-        protocol: a copy of the task's protocol.
+        schedule: a copy of the task's schedule.
     """
 
-    protocol: Protocol
+    schedule: TrialSchedule
+    protocol = renamed_attribute("protocol", "schedule")
 
     def __call__(self, time: float) -> float:
         """The reference at a time (s)."""
-        return self.protocol.at(time)
+        return self.schedule.at(time)
 
 
 def detached_task(task: Task) -> Task:
-    """A copy of a task that shares nothing mutable with it, but a motion that cannot be copied."""
+    """Copy a task without shared mutable data; a motion that cannot be copied stays shared."""
     return copy.deepcopy(task)
 
 
 @dataclass(frozen=True)
 class StationInfo:
-    """What a controller may know of the station before a trial.
+    """Data of the station that a controller receives before a trial.
 
     Attributes:
-        model: the nominal model, also where the plant's own is drawn anew at every reset; a copy.
-        task: the task, with its protocol; a copy.
-        pressure: gauge pressure that the trial begins at (Pa).
-        period: time of a control step (s).
-        action_delay: time from a command to the station (s), whole periods.
+        model: a copy of the nominal model, also if every reset draws another plant.
+        task: the task, with its schedule; a copy.
+        pressure: gauge pressure at the trial's start (Pa).
+        period: duration of a control step (s).
+        action_delay: delay of a command to the station (s), whole periods.
         observation_delay: age of a measurement when the controller receives it (s), whole periods.
     """
 
@@ -60,19 +61,19 @@ class StationInfo:
 
     @property
     def load(self) -> float:
-        """Load that the motor holds while the regulator moves (N); 0 where the motor moves.
+        """Constant load of the motor in a regulator's task (N); 0 in a motor's task.
 
-        In an exercise the load that it begins with: the motor is the operator.
+        In an exercise, in which the motor simulates the operator, it is the initial load.
         """
         return rest_load(self.model, self.task)
 
     def moment(self, measurement: "Measurement") -> float:
-        """Moment at an exercise's joint, as the load cell says it by the nominal pulley (N m)."""
+        """Moment at an exercise's joint, from the load cell and the nominal pulley (N m)."""
         return self.model.parameters["rotor"].radius * measurement.load
 
     def position(self, measurement: "Measurement") -> float:
-        """The position that the task asks for, as the sensors say it (m, rad or N m)."""
-        followed = self.task.protocol.followed
+        """Measured position of the task's controlled quantity (m, rad or N m)."""
+        followed = self.task.schedule.followed
         if followed.is_angle:
             return measurement.rotation
         if followed.is_force:
@@ -84,13 +85,13 @@ class StationInfo:
 
 
 class Measurement(NamedTuple):
-    """The sensors' readings at one instant, in SI; extension and rotation from their zeros.
+    """Measured values at one instant (SI); extension and rotation count from the trial's zeros.
 
     Attributes:
-        time: when it was taken, since the trial began (s).
-        extension: how far the muscle was pulled out of the contraction that the trial began at (m):
-            that at no load, or under the load of a regulator's task, where it is negative while the
-            muscle shortens.
+        time: time of the measurement since the trial's start (s).
+        extension: extension of the muscle from its initial contraction (m), which is that without
+            load, or under the load of a regulator's task; there it is negative while the muscle
+            shortens.
         rotation: pulley angle (rad).
         load: cable tension (N).
         pressure: gauge pressure (Pa).

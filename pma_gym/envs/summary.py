@@ -1,6 +1,6 @@
-"""Score of an episode: RMSE by phase, from the sums that were kept while it ran.
+"""Score of an episode: RMSE by phase, from sums that the engine accumulates.
 
-The last info of an episode is here too, of one environment of any number.
+This file also builds the last info of an episode, for one environment or many.
 """
 
 import math
@@ -20,7 +20,7 @@ from pma_gym.units import SI_FACTORS
 
 
 def last_info(engine: Engine, index: int) -> dict[str, Any]:
-    """The info of the step that ends an environment's episode: all that there is to tell."""
+    """Return the info of the step that ends an environment's episode, with the summary."""
     row = engine.row(index)
     return _step_info(engine, row) | _episode_summary(engine, index, row)
 
@@ -28,17 +28,17 @@ def last_info(engine: Engine, index: int) -> dict[str, Any]:
 def last_infos(
     engine: Engine, over: NDArray[np.bool_], indices: NDArray[np.int64]
 ) -> dict[str, Any]:
-    """Last infos of the episodes of a batch that ended, in Gymnasium's form: arrays with masks.
+    """Return the last infos of a batch's ended episodes, in Gymnasium's form: arrays with masks.
 
     Args:
-        engine: of the batch.
-        over: whose episode ended, shape (num_envs,).
-        indices: their numbers.
+        engine: engine of the batch.
+        over: environments whose episode ended, shape (num_envs,).
+        indices: their indices.
     """
     task = engine.task
     columns = engine.rows(indices).T
     numbers = {name: columns[place] for name, place in engine.state_layout.offsets.items()}
-    sums = {phase.name: numbers[f"sum_{phase.name}"] for phase in task.protocol.phases}
+    sums = {phase.name: numbers[f"sum_{phase.name}"] for phase in task.schedule.phases}
     columns_by_name: dict[str, Any] = {name: numbers[name] for name in engine.state_layout.info}
     columns_by_name |= {name: columns_by_name[name] != 0.0 for name in TRUTHS}
     columns_by_name |= summaries(task, sums, numbers["sample"])
@@ -52,12 +52,12 @@ def last_infos(
 
 
 def step_info(engine: Engine, index: int) -> dict[str, Any]:
-    """Numbers of an environment's last step or reset, by the keys of `PMAEnv`'s info."""
+    """Return the values of an environment's last step or reset, keyed as `PMAEnv`'s info."""
     return _step_info(engine, engine.row(index))
 
 
 def episode_summary(engine: Engine, index: int) -> dict[str, Any]:
-    """What an environment's episode has come to so far, see `PMAEnv.episode_summary`."""
+    """Return the summary of an environment's episode so far, see `PMAEnv.episode_summary`."""
     return _episode_summary(engine, index, engine.row(index))
 
 
@@ -69,7 +69,7 @@ def _step_info(engine: Engine, row: list[float]) -> dict[str, Any]:
 
 def _episode_summary(engine: Engine, index: int, row: list[float]) -> dict[str, Any]:
     task, offsets = engine.task, engine.state_layout.offsets
-    sums = {phase.name: row[offsets[f"sum_{phase.name}"]] for phase in task.protocol.phases}
+    sums = {phase.name: row[offsets[f"sum_{phase.name}"]] for phase in task.schedule.phases}
     score = summary(task, sums, row[offsets["sample"]])
     code = row[offsets["ended"]]
     score["ended_by"] = limit_in_words(engine.models[index], code, task.exercise)
@@ -81,20 +81,20 @@ def _episode_summary(engine: Engine, index: int, row: list[float]) -> dict[str, 
 
 
 def summary(task: Task, sums: Mapping[str, float], samples: float) -> dict[str, Any]:
-    """RMSE of the true position at 384 Hz so far, in file units.
+    """Return the RMSE of the true position at 384 Hz so far, in file units.
 
     Args:
         task: the task.
-        sums: squared errors (m^2 or rad^2) by phase, each on its own ideal line.
-        samples: samples so far, the first at the trial's beginning.
+        sums: sums of squared errors (m^2 or rad^2) by phase, each against its ideal line.
+        samples: number of samples so far, the first at the trial's start.
     Returns:
-        rmse_mm or rmse_deg over all phases, rmse_by_phase_mm or _deg of each phase begun,
+        rmse_mm or rmse_deg over all phases, rmse_by_phase_mm or _deg of each phase so far,
         percent_of_range.
     """
-    protocol = task.protocol
-    unit, factor = protocol.suffix, SI_FACTORS[protocol.unit]
+    schedule = task.schedule
+    unit, factor = schedule.suffix, SI_FACTORS[schedule.unit]
     counts = {
-        phase.name: min(max(samples - phase.first, 0.0), phase.samples) for phase in protocol.phases
+        phase.name: min(max(samples - phase.first, 0.0), phase.samples) for phase in schedule.phases
     }
     begun = {name: count for name, count in counts.items() if count > 0.0}
     total = math.sqrt(sum(sums[name] for name in begun) / sum(begun.values()))
@@ -103,24 +103,24 @@ def summary(task: Task, sums: Mapping[str, float], samples: float) -> dict[str, 
         f"rmse_by_phase_{unit}": {
             name: math.sqrt(sums[name] / count) / factor for name, count in begun.items()
         },
-        "percent_of_range": percent_of_range(total, protocol.span),
+        "percent_of_range": percent_of_range(total, schedule.span),
     }
 
 
 def summaries(
     task: Task, sums: Mapping[str, NDArray[np.float64]], samples: NDArray[np.float64]
 ) -> dict[str, Any]:
-    """As `summary`, of many episodes at once, to the same bits; NaN for a phase not begun.
+    """Compute `summary` for many episodes at once, with equal bits; NaN for a phase not begun.
 
     Args:
         task: the task.
-        sums: squared errors (m^2 or rad^2) by phase, shape (m,) each.
-        samples: samples so far, shape (m,).
+        sums: sums of squared errors (m^2 or rad^2) by phase, shape (m,) each.
+        samples: number of samples so far, shape (m,).
     """
-    protocol = task.protocol
-    unit, factor = protocol.suffix, SI_FACTORS[protocol.unit]
+    schedule = task.schedule
+    unit, factor = schedule.suffix, SI_FACTORS[schedule.unit]
     total, number, by_phase = np.zeros(len(samples)), np.zeros(len(samples)), {}
-    for phase in protocol.phases:
+    for phase in schedule.phases:
         count = np.clip(samples - phase.first, 0.0, phase.samples)
         begun = count > 0.0
         # A phase that has not begun adds nothing: its sum is 0.
@@ -131,28 +131,28 @@ def summaries(
     return {
         f"rmse_{unit}": whole / factor,
         f"rmse_by_phase_{unit}": by_phase,
-        "percent_of_range": 100.0 * whole / protocol.span,
+        "percent_of_range": 100.0 * whole / schedule.span,
     }
 
 
 def exercise_offsets() -> list[str]:
-    """Places of what `exercise_summaries` needs."""
+    """Offsets in the engine's record of the numbers for `exercise_summaries`."""
     return [*PEAKS, *WORK, *(f"pace_{phase.name}" for phase in PACE.phases)]
 
 
 def exercise_summaries(
     numbers: Mapping[str, NDArray[np.float64]], counts: NDArray[np.int64], period: float
 ) -> dict[str, NDArray[np.float64]]:
-    """What exercises came to beside their RMSE, in file units.
+    """Return the scores of exercises in addition to the RMSE, in file units.
 
     Args:
-        numbers: of `exercise_offsets` by name, shape (m,) each.
+        numbers: numbers of `exercise_offsets` by name, shape (m,) each.
         counts: control steps so far, shape (m,).
-        period: of the control steps (s).
+        period: duration of a control step (s).
     Returns:
         By name, shape (m,): `pace_rmse_deg` of the angle against its ideal line, over all phases;
-        `peak_moment_nm`, `peak_speed_deg_s`, `peak_power_w` (either way) at the control steps'
-        ends; `work_j` that the joint did on the device and `returned_j` that it took back.
+        `peak_moment_nm`, `peak_speed_deg_s`, `peak_power_w` (in either direction) at the ends of
+        control steps; `work_j` by the joint on the device and `returned_j` by the device.
     """
     degree = SI_FACTORS["deg"]
     last = round(PACE.duration / period)

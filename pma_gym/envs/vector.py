@@ -46,7 +46,7 @@ OWN = (
     *("num_envs", "task", "autoreset_mode", "threads", "precision", "pressures_kpa"),
     *("render_mode", "render_width"),
 )
-"""Keyword arguments of a batch beside the options."""
+"""Keyword arguments of a batch in addition to the options."""
 
 RESET_OPTIONS = ("pressure_kpa", "pressures_kpa", "reset_mask")
 
@@ -54,26 +54,27 @@ RESET_OPTIONS = ("pressure_kpa", "pressures_kpa", "reset_mask")
 class PMAVectorEnv(
     Copies, SeededByReset, VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[Any]]
 ):
-    """As `PMAEnv`, n times: the same actions, observations, rewards and ends, side by side.
+    """Run n `PMAEnv` in parallel, with the same actions, observations, rewards and ends.
 
-    An environment gives the same bits here as alone with the same seed, whatever n and the number
-    of threads. `gym.make_vec(id, num_envs=n, vectorization_mode="vector_entry_point")` makes one.
+    An environment gives the same bits as a single environment with the same seed, for every n and
+    number of threads. `gym.make_vec(id, num_envs=n, vectorization_mode="vector_entry_point")` makes
+    a batch.
 
-    While no episode ends `info` is empty. When episodes end it has what `PMAEnv` puts in their last
-    info, as arrays of shape (num_envs,), each with its mask `_name`; with SAME_STEP it stands in
-    `final_info`, beside `final_obs`. `station_info()` has the numbers of any step.
+    `info` is empty unless episodes end. Then it contains the last info of `PMAEnv` as arrays of
+    shape (num_envs,), each with its mask `_name`; with SAME_STEP they are in `final_info`, beside
+    `final_obs`. `station_info()` returns the values of any step.
 
     Args:
-        num_envs: how many.
+        num_envs: number of environments.
         task: name of a task, or a Task; as `PMAEnv`.
         autoreset_mode: NEXT_STEP (default), SAME_STEP or DISABLED (then `reset` takes the option
             `reset_mask`).
-        threads: how many threads step them, at most one for every block
-            of environments: 8 with AVX-512, else 4 (twice as many in single precision).
-        precision: `double`, or `single`: faster, positions mostly within 2e-5 of their range, and
-            rarely 1e-3 off, where rounding decides when friction lets go.
-        pressures_kpa: pressures of each environment, in place of `pressure_kpa` for all.
-        render_mode: None or `rgb_array`; a batch that renders keeps the course of every episode.
+        threads: number of threads, at most one per block of environments: 8 with AVX-512, else 4
+            (twice as many in single precision).
+        precision: `double`, or `single`: faster, with errors of positions mostly below 2e-5 of
+            their range, rarely 1e-3, where rounding decides when friction slips.
+        pressures_kpa: pressure of each environment, instead of `pressure_kpa` for all.
+        render_mode: None or `rgb_array`; a batch that renders records the course of every episode.
         render_width: width of the pictures (pixels), a multiple of 4; they are half as high.
         options: as `PMAEnv`; a `reward` that is a function is called once for each environment.
 
@@ -167,10 +168,10 @@ class PMAVectorEnv(
         """Begin an episode in every environment.
 
         Args:
-            seed: seed of the first environment, the others counting up from it; or one each.
-            options: may hold, for these episodes, `pressure_kpa` (for all) or `pressures_kpa` (for
-                each environment); and `reset_mask`, bool of shape (num_envs,): which environments
-                begin anew, the others go on.
+            seed: seed of the first environment, with consecutive seeds for the others; or one each.
+            options: may contain, for these episodes, `pressure_kpa` (for all) or `pressures_kpa`
+                (for each environment); and `reset_mask`, bool of shape (num_envs,): the
+                environments to reset, while the others continue.
         Raises:
             TypeError: an unknown option.
             ValueError: a pressure out of range, or seeds, pressures or a mask of another length.
@@ -205,9 +206,9 @@ class PMAVectorEnv(
 
     @property
     def np_random_seed(self) -> int | tuple[int | None, ...]:  # type: ignore[override]
-        """What `reset(seed=...)` takes to begin again as it did.
+        """Seed that repeats the last reset as `reset(seed=...)`.
 
-        The first environment's seed where the others count up from it, else all of them.
+        It is the first environment's seed if the others are consecutive, else all seeds.
         """
         first = self._seeds[0]
         if not any(seed is not None for seed in self._seeds):
@@ -217,9 +218,9 @@ class PMAVectorEnv(
         return self._seeds
 
     def get_state(self) -> EnvState:
-        """All that the environments need to go on from here with the same bits, as a value.
+        """Return the state from which the environments continue with the same bits.
 
-        Before the first `reset` too: then it is the state of environments that wait for it.
+        It works before the first `reset` too.
         """
         return EnvState(
             self._setup,
@@ -232,15 +233,15 @@ class PMAVectorEnv(
         )
 
     def set_state(self, state: EnvState) -> None:
-        """Go on from a state, of these environments or of others that were made as these.
+        """Continue from a state of these environments or of ones with the same arguments.
 
         Args:
-            state: what `get_state` gave; or what `PMAEnv.get_state` gave, and all of them go on
-                from there, for as many trials of what to do next.
+            state: result of `get_state`; or of `PMAEnv.get_state`, from which all environments then
+                continue, for example to try several actions.
         Raises:
-            TypeError: no state.
-            StateError: a state of another task, other options or another model, naming what
-                differs; or a damaged one. Nothing has changed then.
+            TypeError: not a state.
+            StateError: a damaged state, or one with another task, options or model, with the
+                differences. The environments are unchanged then.
         """
         state = check_state(self._spread(state), self._setup, self.num_envs)
         put(self.engine, state.simulation)
@@ -279,12 +280,13 @@ class PMAVectorEnv(
         NDArray[np.bool_],
         dict[str, Any],
     ]:
-        """Command every station, let one control step pass, return its result.
+        """Apply actions for one control step and return the results.
 
         Args:
             actions: shape (num_envs, entries of an action).
         Raises:
-            ValueError: actions of another shape, or not finite; nothing has happened then.
+            ValueError: actions of another shape, or not finite; the environments are unchanged
+                then.
             gymnasium.error.ResetNeeded: `reset` was not called; or, without autoreset, an episode
                 has ended.
         """
@@ -316,7 +318,7 @@ class PMAVectorEnv(
 
     @property
     def spec(self) -> EnvSpec | None:
-        """How Gymnasium made it: with plain arguments and the true number of steps, for JSON."""
+        """Gymnasium's spec with JSON arguments and the true number of steps."""
         return self.__dict__.get("spec")
 
     @spec.setter
@@ -380,17 +382,17 @@ class PMAVectorEnv(
         return int(engine.terminated.any() or engine.truncated.any())
 
     def station_info(self) -> dict[str, NDArray[Any]]:
-        """The numbers of `PMAEnv`'s info in the last step, shape (num_envs,) each."""
+        """Return the values of `PMAEnv`'s info in the last step, shape (num_envs,) each."""
         info: dict[str, NDArray[Any]] = {
             name: self.engine.numbers(name) for name in self.engine.state_layout.info
         }
         return info | {name: info[name] != 0.0 for name in TRUTHS}
 
     def measurements(self) -> NDArray[np.float64]:
-        """What the sensors say, `observation_delay_s` ago (SI), shape (4, num_envs).
+        """Measurements that agents receive, `observation_delay_s` old (SI), shape (4, num_envs).
 
-        Extension (m), rotation (rad), load (N), pressure (Pa): of each environment what
-        `PMAEnv.measurement` has.
+        The rows are extension (m), rotation (rad), load (N) and pressure (Pa), as in
+        `PMAEnv.measurement`.
         """
         late = self.options.observation_delay
         return np.stack([self.engine.numbers(f"{part}_{late}") for part in PARTS])
@@ -399,14 +401,14 @@ class PMAVectorEnv(
 
     @property
     def pressures(self) -> NDArray[np.float64]:
-        """Gauge pressure that every episode began at (Pa), shape (num_envs,)."""
+        """Gauge pressure at the start of every episode (Pa), shape (num_envs,)."""
         return self.engine.pressures.copy()
 
     def member(self, index: int) -> BatchMember:
-        """One of the environments, to be read as a `PMAEnv`.
+        """Return a read-only view of one environment, with the attributes of a `PMAEnv`.
 
         Args:
-            index: its number, from 0; negative ones count from the end.
+            index: index of the environment, from 0; negative ones count from the end.
         Raises:
             IndexError: there is no such environment.
         """
@@ -418,7 +420,7 @@ class PMAVectorEnv(
         return BatchMember(self, index % self.num_envs)
 
     def render(self) -> tuple[NDArray[np.uint8], ...] | None:  # type: ignore[override]
-        """A picture of every station and of its trial so far, RGB.
+        """Return a picture of every station and of its trial so far, RGB.
 
         Returns:
             Shape (render_width / 2, render_width, 3) each.
@@ -435,7 +437,7 @@ class PMAVectorEnv(
         return tuple(self.member(i).picture() for i in range(self.num_envs))
 
     def close_extras(self, **kwargs: Any) -> None:
-        """Free the picture and end the threads."""
+        """Free the picture and stop the threads."""
         # Gymnasium 1.1 closes a batch whose options were refused too.
         if hasattr(self, "engine"):
             self._display.close()

@@ -1,1 +1,1 @@
-"""Parameter estimation: residuals and sensitivities of many trials, least squares, fits."""
+"""Parameter estimation: residuals and sensitivities of trials, least squares, fits."""

@@ -13,9 +13,9 @@ class Round:
     """Progress of a fit.
 
     Attributes:
-        number: rounds so far.
-        trials: how many trials they use now.
-        chi_square: the least sum of squared residuals over these so far.
+        number: number of rounds so far.
+        trials: number of trials in use.
+        chi_square: smallest sum of squared residuals over these trials so far.
         values: its parameters by path, in file units.
     """
 
@@ -32,18 +32,19 @@ class Fit:
     Attributes:
         model: the model with the fitted parameters.
         parameters: the fitted parameters in SI, by `effect.parameter`.
-        covariance: of `parameters`, in their order, in SI, scaled as the errors, shape (p, p).
-        values: the parameters in file units, by path, as `Model.replace` takes them.
-        errors: their standard errors, by path: from the readings' noise, and where the model leaves
-            more than noise unexplained, that much larger. Infinite for one that the trials do not
-            determine; nan for one at a bound.
-        chi_square: sum of squared residuals, in standard deviations of the readings.
+        covariance: covariance of `parameters`, in their order, in SI, scaled as the errors, shape
+            (p, p).
+        values: the parameters in file units, by path, for `Model.replace`.
+        errors: their standard errors, by path, from the measurement noise; scaled up if the
+            residuals exceed the noise. Infinite for a parameter that the trials do not determine;
+            nan for one at a bound.
+        chi_square: sum of squared residuals, in standard deviations of the measurements.
         count: number of residuals.
-        rounds: how many times the trials were simulated with all moves, few or all.
-        simulated: trials simulated.
-        converged: whether a further step would gain nothing worth while, or chi-square is too
-            rugged for one: `CLOSE`, `SHARE` and `RUGGED` of `pma_gym.estimation.fitting`.
-        at_bounds: paths of parameters that a bound holds.
+        rounds: number of rounds, each with all finite differences.
+        simulated: number of simulated trials.
+        converged: whether the fit has converged, by `CLOSE`, `SHARE` or `RUGGED` of
+            `pma_gym.estimation.fitting`.
+        at_bounds: paths of parameters at a bound.
     """
 
     model: Model
@@ -60,5 +61,5 @@ class Fit:
 
     @property
     def reduced_chi_square(self) -> float:
-        """Chi-square per degree of freedom: 1 where noise is all that is left."""
+        """Chi-square per degree of freedom: 1 if the residuals are noise only."""
         return self.chi_square / max(self.count - len(self.values), 1)

@@ -1,15 +1,14 @@
-"""Fits a model's parameters to measured trials, all of them at once.
+"""Fit of a model's parameters to all measured trials at once.
 
-Least squares by Levenberg and Marquardt, within the bounds of the catalogue. Each round simulates
-every trial with the parameters and with each of them moved a little (`residuals`), and needs no
-more than sums over the residuals. The first rounds use a few of the trials, to come near; the last
-step is checked by simulating without moves.
+The method is Levenberg-Marquardt least squares within the bounds of the catalogue. Each round
+simulates every trial with the parameters and with a finite difference of each (`residuals`), and
+needs only sums over the residuals. The first rounds use a few trials to come close; a simulation
+without differences checks the last step.
 
-How far parameters are moved: an adaptive integrator's error changes from one step control to the
-next, so simulated trials jitter by some thousandths of the sensors' noise when a parameter moves,
-however little. Each parameter is therefore moved so far that what the sensors show changes by
-`SHOWN` of their noise (root mean square over all residuals): far above that jitter, and little
-enough that the second derivative does not show.
+Size of the differences: step-size control makes simulated trials jitter by some thousandths of the
+sensors' noise when a parameter changes, however little. Each difference therefore changes the
+measurements by `SHOWN` of their noise (root mean square over all residuals): far above the jitter,
+and small enough for a negligible second derivative.
 """
 
 from collections.abc import Callable, Sequence
@@ -33,7 +32,7 @@ __all__ = ["Fit", "Round", "fit"]
 Array = NDArray[np.float64]
 
 SHOWN = 0.3
-"""What moving a parameter for a difference changes, in standard deviations of the readings."""
+"""Change of the measurements by a finite difference, in their standard deviations."""
 
 FIRST_MOVE, LEAST_MOVE, MOST_MOVE = 1e-3, 1e-6, 2e-2
 """First, least and largest such move, as a share of the parameter's value, or of its bounds' width
@@ -60,12 +59,11 @@ ROUGH = 100.0
 """All of these times so much for the first rounds, which use a few trials only."""
 
 MISSED = 0.1
-"""By how much chi-square may miss what the last step promised, as a share of that and of its mean
-per residual."""
+"""Tolerance of chi-square against the prediction of the last step, relative to the prediction and
+to the mean per residual."""
 
 FEW = 8
-"""How many trials the first rounds use, drawn from all by a fixed seed, where there are twice as
-many."""
+"""Number of trials in the first rounds, drawn by a fixed seed, if there are twice as many."""
 
 MOST_ROUNDS = 50
 _FIRST_DAMPING, _MOST_DAMPING = 1e-4, 1e12
@@ -82,23 +80,23 @@ def fit(
     central: bool = False,
     progress: Callable[[Round], None] | None = None,
 ) -> Fit:
-    """Fit a model to trials, from the values that it has.
+    """Fit a model to trials, starting from the model's values.
 
-    The same input gives the same bits, whatever the number of threads and of cores.
+    The same input gives the same bits for every number of threads and cores.
 
     Args:
         model: the model.
-        trials: measured trials; every quantity counts by its sensor's noise.
-        free: paths of the parameters that may change, `effect.parameter_unit`.
-        threads: how many threads simulate.
-        tolerance: of the integrator.
+        trials: measured trials; the sensor's noise weighs each quantity.
+        free: paths of the free parameters, `effect.parameter_unit`.
+        threads: number of threads.
+        tolerance: tolerance of the integrator.
         interpolation: of the commands between rows: "foh" (first-order hold, linear) or "zoh" (each
             held until the next).
-        central: move parameters both ways for differences, at twice the cost.
-        progress: called after every round; what it raises ends the fit.
+        central: use central differences, at twice the cost.
+        progress: called after every round; an exception in it ends the fit.
     Raises:
         ModelError: a path that cannot be fitted.
-        ValueError: a start at which the model cannot be simulated, or trials without measurements.
+        ValueError: the model cannot be simulated at its values, or trials without measurements.
     """
 
     def residuals(some: Sequence[Trial]) -> Residuals:
@@ -119,20 +117,20 @@ def _some(trials: Sequence[Trial]) -> list[Trial]:
 
 
 class LevenbergMarquardt:
-    """Parameters on their way to the best.
+    """Levenberg-Marquardt iteration with its present state.
 
     Args:
         residuals: the trials.
-        central: whether parameters are moved both ways.
+        central: whether differences are central.
         rough: see `ROUGH`.
-        before: a search over fewer trials, whose result is the start.
+        before: an iteration over fewer trials, whose result is the start.
 
     Attributes:
         values: the best so far, in file units, shape (p,).
-        best: the sums there.
-        damping: of the next step.
-        rate: by which factor the last step lowered what the next one should gain.
-        failures: how many steps in a row did not lower chi-square.
+        best: the sums at it.
+        damping: damping of the next step.
+        rate: factor by which the last step lowered the expected gain of the next one.
+        failures: number of successive steps that did not lower chi-square.
         rounds, simulated: as in `Fit`.
     """
 
@@ -165,7 +163,7 @@ class LevenbergMarquardt:
 
     @property
     def mean(self) -> float:
-        """Mean squared residual, if it is more than noise."""
+        """Mean squared residual, at least 1."""
         return max(1.0, self.best.chi_square / self.residuals.count)
 
     @property
@@ -174,7 +172,7 @@ class LevenbergMarquardt:
         return self.best.chi_square - self.residuals.count
 
     def run(self, progress: Callable[[Round], None] | None, most: int = MOST_ROUNDS) -> bool:
-        """Search for so many rounds at most; whether it converged."""
+        """Iterate up to a number of rounds, and return whether the fit converged."""
         while self.rounds < most and self.damping < _MOST_DAMPING:
             if progress is not None:
                 trials, best = self.residuals.trials, self.best.chi_square
@@ -189,7 +187,7 @@ class LevenbergMarquardt:
         return {path: float(value) for path, value in zip(paths, values, strict=True)}
 
     def advance(self) -> bool:
-        """One step; whether no other is worth while."""
+        """Make one step, and return whether the fit has converged."""
         step, promise = self._step(0.0)
         if promise < self.rough * max(CLOSE * self.mean, SHARE * self.surplus):
             return True
@@ -259,7 +257,7 @@ class LevenbergMarquardt:
         return step, float(-(2.0 * gradient @ step + step @ curvature @ step))
 
     def result(self, converged: bool) -> Fit:
-        """The fit at the best parameters."""
+        """Return the fit at the best parameters."""
         residuals, held = self.residuals, self._held()
         values, size = self.named(self.values), len(self.values)
         covariance = np.full((size, size), np.nan)

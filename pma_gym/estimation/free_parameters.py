@@ -11,12 +11,12 @@ from pma_gym.units import Quantity
 
 @dataclass(frozen=True)
 class FreeParameter:
-    """A parameter that a fit may change.
+    """A free parameter of a fit.
 
     Attributes:
         path: `effect.parameter_unit`, as in `Model.paths`.
         name: `effect.parameter`, without a unit.
-        place: its place in the vector that compiled functions read.
+        place: its index in the vector of the compiled functions.
         quantity: its unit and bounds.
     """
 
@@ -27,7 +27,7 @@ class FreeParameter:
 
 
 def free_parameters(model: Model, paths: Sequence[str]) -> list[FreeParameter]:
-    """Parameters by their paths.
+    """Look up the free parameters of a model by their paths.
 
     Raises:
         ModelError: a path that the model does not have, a row of numbers or a sensor's noise.

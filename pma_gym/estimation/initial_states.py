@@ -1,10 +1,10 @@
-"""How a trial of a rig that nothing holds began: what its first readings say, and a correction.
+"""Initial states of a free rig's trials: estimate from the first measurements, and correction.
 
-A start of 0.2 mm/s more leads 0.2 mm further within a second, far more than a sensor's noise; no
-derivative of first readings is that exact. So every trial is simulated once more with another
-speed at its start, and with another position where its zero is the rig's own; each simulation is
-moved along the differences to where it meets the readings best. To first order that is a fit of
-the starting position and speed beside whatever else is fitted.
+An error of 0.2 mm/s in the initial speed causes 0.2 mm within a second, far more than a sensor's
+noise; no derivative of the first measurements is that accurate. Every trial is therefore simulated
+again with another initial speed, and with another initial position if the rig defines its zero.
+Linear combinations of these simulations fit the measurements. To first order this estimates the
+initial position and speed together with the other parameters.
 """
 
 from collections.abc import Sequence
@@ -17,20 +17,20 @@ from pma_gym.estimation.logged import Logged
 Array = NDArray[np.float64]
 
 FIRST_S, FIRST_ROWS = 0.05, 8
-"""Time (s) and least number of first readings that a start is taken from."""
+"""Time (s) and smallest number of first measurements for the estimate of an initial state."""
 
 MOVE = 1e-3
-"""By how much a starting position or speed is moved for its difference (SI)."""
+"""Differences of initial position and speed (SI)."""
 
 
 def starts(trials: Sequence[Logged]) -> tuple[Array, Array]:
-    """Position and its rate (SI) where trials begin, shape (trials,) each."""
+    """Estimate the initial position and speed of trials (SI), shape (trials,) each."""
     fitted = np.array([_start(logged) for logged in trials])
     return fitted[:, 0], fitted[:, 1]
 
 
 def meet(states: Array, held: Array, logged: Logged, levels: Array, further: int) -> None:
-    """Move simulations along what other starts change, to the readings.
+    """Correct simulations for their initial states, so that they fit the measurements.
 
     Args:
         states: of all simulations, the last of which are the first with another start each, shape

@@ -22,7 +22,7 @@ def _eigen(matrix: Array) -> tuple[Array, Array]:
 
 
 def least(gradient: Array, curvature: Array, damping: float, low: Array, high: Array) -> Array:
-    """Where 2 g.x + x.(A + damping diag A) x is least between bounds that 0 lies between."""
+    """Minimise 2 g.x + x.(A + damping diag A) x within bounds around 0."""
     if not gradient.size:
         # A model without a parameter of its own: nothing moves.
         return gradient
@@ -45,7 +45,7 @@ def least(gradient: Array, curvature: Array, damping: float, low: Array, high: A
 
 
 def inverse(curvature: Array) -> Array:
-    """Inverse; infinite on the diagonal for what has no influence, or none that is its own."""
+    """Invert the matrix; the diagonal is infinite for parameters that are not identifiable."""
     scale = np.sqrt(np.diag(curvature))
     scale = np.where(scale > 0.0, scale, 1.0)
     values, vectors = _eigen(curvature / np.outer(scale, scale))

@@ -1,4 +1,4 @@
-"""Measured trials as a fit reads them."""
+"""Measured trials in the form that a fit needs."""
 
 from dataclasses import dataclass
 
@@ -16,10 +16,10 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Logged:
-    """A trial as a fit reads it.
+    """A measured trial in the form that a fit needs.
 
     Attributes:
-        signals: what the rig's sensors measure, in the order of readings.
+        signals: the measured signals of the rig, in the order of `measured`.
         time: times (s), shape (rows,).
         motor: motor voltage (V), or the command that the drive takes as it comes (SI), shape
             (rows,).
@@ -43,14 +43,14 @@ class Logged:
 
     @classmethod
     def of(cls, model: Model, number: int, trial: Trial) -> "Logged":
-        """From a trial.
+        """Convert a trial.
 
         Args:
-            model: gives what commanded loads and pressures are in volts.
-            number: which trial it is, for the message.
+            model: model that converts commanded loads and pressures to voltages.
+            number: number of the trial, for the message.
             trial: the trial.
         Raises:
-            ValueError: it measures nothing.
+            ValueError: a trial without measurements.
         """
         motor, regulator = sensors.voltages(model, trial)
         nothing = np.full(len(trial.time), np.nan)
@@ -91,10 +91,10 @@ class Logged:
 
     @property
     def first(self) -> tuple[float, float]:
-        """The first commands (V)."""
+        """Commands in the first row (V)."""
         return float(self.motor[0]), float(self.regulator[0])
 
     @property
     def count(self) -> int:
-        """Number of readings."""
+        """Number of measurements."""
         return self.measured.size - sum(rows.size for rows in self.missing)

@@ -1,8 +1,8 @@
 """Residuals of a model over many trials, and their sensitivity to its parameters.
 
-All trials, each with the parameters as they are and with every free one moved a little, are
-simulated together. Sums over residuals are made trial by trial, so that no Jacobian of a million
-rows is ever held.
+All trials are simulated together, each with the parameters and with a finite difference of every
+free one. Sums over residuals are made trial by trial, so that memory never holds a Jacobian of a
+million rows.
 """
 
 import math
@@ -25,11 +25,11 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Sums:
-    """Sums over the residuals r of all trials, in units of their noise; J = dr / d(parameters).
+    """Sums over the residuals r of all trials, in units of the noise; J = dr / d(parameters).
 
     Attributes:
-        chi_square: r.r; infinite where the model cannot be simulated.
-        gradient: J^T r, shape (p,), per unit in files.
+        chi_square: r.r; infinite if the model cannot be simulated.
+        gradient: J^T r, shape (p,), per file unit.
         curvature: J^T J, shape (p, p).
     """
 
@@ -39,13 +39,13 @@ class Sums:
 
 
 class Residuals(SimulatedTrials):
-    """Measured trials beside a model whose free parameters are given.
+    """Residuals of measured trials against a model, for given values of its free parameters.
 
-    A residual is simulated minus measured, in standard deviations: the sensor's noise and the
-    rounding of the DAQ. Sensors hold what their lag makes of the truth. NaN counts for nothing, nor
-    does a reading at an end of the DAQ's range, which says only that the truth lies beyond. A trial
-    begins settled at its first commands, memories where they fit it best between 0 and 1 unless the
-    trial says where (`memory_start`); a rig that nothing holds, where and as fast as fits it best.
+    A residual is simulated minus measured, in standard deviations of sensor noise and DAQ rounding.
+    Simulated measurements include the sensor's lag. Missing values (NaN) are left out, and so are
+    measurements at an end of the DAQ's range, which are saturated. A trial begins in equilibrium at
+    its first commands. Its initial hysteresis state is fitted between 0 and 1 unless the trial
+    gives it (`memory_start`); the initial position and speed of a free rig are fitted.
 
     The model's noise levels weigh the sensors. Arguments, further attributes and errors are those
     of `SimulatedTrials`.
@@ -70,12 +70,12 @@ class Residuals(SimulatedTrials):
         ]
 
     def sums(self, values: Array, steps: Array, central: bool = False) -> Sums:
-        """Sums at parameters, with the Jacobian by finite differences.
+        """Compute the sums at parameter values, with the Jacobian by finite differences.
 
         Args:
             values: the parameters in file units, shape (p,).
-            steps: how far each is moved, with its sign, shape (p,); or (0,) for chi-square only.
-            central: move each both ways, which costs twice as much.
+            steps: signed step of each difference, shape (p,); or (0,) for chi-square only.
+            central: use central differences, at twice the cost.
         """
         size = len(steps)
         total = np.zeros((size + 1, size + 1))
@@ -94,15 +94,15 @@ class Residuals(SimulatedTrials):
         return Sums(float(total[0, 0]), total[1:, 0], total[1:, 1:])
 
     def each(self, values: Array) -> list[Array]:
-        """Residuals of each trial at parameters, shape (rows, signals) in the order of outputs.
+        """Compute the residuals of each trial, shape (rows, signals) in the order of outputs.
 
         Raises:
-            ValueError: the model cannot balance the load at the beginning of a trial.
+            ValueError: the model cannot balance the load at the start of a trial.
         """
         return [differences[0] for differences in self._dense(values, np.ones(0), central=False)]
 
     def jacobian(self, values: Array, steps: Array, central: bool = False) -> list[Array]:
-        """Derivatives of each trial's residuals, shape (p, rows, signals), as `sums` uses them."""
+        """Compute the derivatives of each trial's residuals, shape (p, rows, signals)."""
         trials = self._dense(values, steps, central)
         return [differences[1:] / steps[:, None, None] for differences in trials]
 

@@ -1,8 +1,8 @@
-"""Measured trials simulated by a model at many values of its free parameters.
+"""Simulation of measured trials by a model at many values of its free parameters.
 
-Every trial begins settled at its first commands. Where nothing says how a memory stands or how
-fast a free rig moves then, each trial is simulated once more with another start, and moved along
-the difference to where it meets its readings best.
+Every trial begins in equilibrium at its first commands. If the initial hysteresis state, or the
+initial speed of a free rig, is unknown, each trial is simulated again with another initial state,
+and a linear combination of both simulations fits the measurements.
 """
 
 import math
@@ -29,18 +29,18 @@ from pma_gym.plant.simulation import Run, simulate_all
 Array = NDArray[np.float64]
 
 MOST_BYTES = 1 << 28
-"""Most memory for the states of trials that are simulated together."""
+"""Largest memory for the states of trials that are simulated together."""
 
 
 class SimulatedTrials:
-    """Measured trials, and a model that simulates them all with any values of its free parameters.
+    """Simulate measured trials with any values of a model's free parameters.
 
     Args:
-        model: the model; its drive and its regulator's line say what commanded loads and pressures
-            are in volts.
-        trials: the trials, which need measurements.
+        model: the model; its drive and regulator convert commanded loads and pressures to
+            voltages.
+        trials: the trials, with measurements.
         free: paths of the free parameters.
-        tolerance: of the integrator, as `Plant`.
+        tolerance: tolerance of the integrator, as in `Plant`.
         interpolation: of the commands between rows: "foh" (first-order hold, linear) or "zoh" (each
             held until the next).
         threads: how many threads share the work; the results' bits do not depend on it.
@@ -49,13 +49,14 @@ class SimulatedTrials:
         free: the free parameters.
         factors: SI value of one unit in files of each, shape (p,).
         start: their values in the model, in file units, shape (p,).
-        count: number of readings that count.
+        count: number of measurements in use.
         deviations: standard deviations of the sensors (SI), shape (signals,).
         trials: number of trials.
-        balanced: which of the parameters tried last balance the load where trials begin.
+        balanced: whether each of the last parameter values has an equilibrium at the start of
+            trials.
     Raises:
         ModelError: a path that the model does not have, a row of numbers or a sensor's noise.
-        ValueError: no trial, or one that measures nothing.
+        ValueError: no trial, or one without measurements.
     """
 
     def __init__(

@@ -1,1 +1,1 @@
-"""Plants: a model's equations of motion, settled, stepped, simulated and linearised."""
+"""Plants: a model's equations of motion, their equilibria, simulation and linearisation."""

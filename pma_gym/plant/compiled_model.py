@@ -11,8 +11,8 @@ from pma_gym.plant.model import Model, load_model
 from pma_gym.plant.program import program, table, vector
 
 DEFAULT_TOLERANCE = 2.3e-4
-"""Largest error of an internal step, as a share of the states' scales, chosen by measured error:
-`python -m benchmarks accuracy` holds the result against scipy at rtol 1e-11."""
+"""Default of the largest error of an internal step, relative to the states' scales.
+`python -m benchmarks accuracy` measures the resulting error against scipy at rtol 1e-11."""
 
 
 class CompiledModel:
@@ -20,17 +20,17 @@ class CompiledModel:
 
     Args:
         model: a Model, the name of a shipped one, or the path of a TOML file.
-        tolerance: largest error of an internal step, as a share of what the plant's states are
-            counted against; a station's positions are held to 0.1 % of it.
+        tolerance: largest error of an internal step, relative to the scales of the states; the
+            positions of a station are held to 0.1 % of it.
 
     Attributes:
         model: the Model.
         tolerance: the tolerance.
         program: the compiled functions of all models of this structure.
-        vector: tolerance and parameters, as compiled functions read them.
-        table: what is fixed for a model, as compiled functions read it.
+        vector: tolerance and parameters, as the compiled functions read them.
+        table: the model's constants, as the compiled functions read them.
         states: names of the states, in the order of the state vector.
-        signals: what the rig's sensors measure, in the order of outputs.
+        signals: the measured signals of the rig, in the order of outputs.
         outputs: names of the true outputs; of a station contraction (m), rotation (rad), load (N),
             pressure (Pa).
     """
@@ -41,8 +41,8 @@ class CompiledModel:
         """Compile the model's equations, or load them from the cache.
 
         Raises:
-            ModelError: no such model, or one that cannot be used.
-            ValueError: a tolerance that is none.
+            ModelError: an unknown or invalid model.
+            ValueError: an invalid tolerance.
         """
         check_tolerance(tolerance)
         self.model = load_model(model)
@@ -56,7 +56,7 @@ class CompiledModel:
         self.sensor_columns = [self.states.index(lag) if lag in self.states else -1 for lag in lags]
 
     def __reduce__(self) -> "tuple[type[CompiledModel], tuple[Model, float]]":
-        """Copy and pickle by construction: compiled functions belong to their process."""
+        """Copy and pickle by construction, because compiled functions belong to one process."""
         return type(self), (self.model, self.tolerance)
 
     @property
@@ -70,12 +70,12 @@ class CompiledModel:
         return self.model.parameters
 
     def _repr_html_(self) -> str:
-        """What a notebook shows: the model's table, and the plant's states."""
+        """Table of the model and the plant's states for notebooks."""
         states = f"<p>States: {', '.join(self.states)}</p>"
         return self.model._repr_html_() + states
 
     def regulator_voltage(self, pressure: float) -> float:
-        """Regulator voltage (V) that settles at a pressure (Pa).
+        """Regulator voltage (V) for a steady pressure (Pa).
 
         Raises:
             ValueError: if the regulator would need less than 0 or more than 10 V.
@@ -101,10 +101,10 @@ class CompiledModel:
 
         Args:
             states: shape (rows, states).
-            zero_contraction: contraction x0 that extension counts from (m).
+            zero_contraction: contraction x0, the zero of extension (m).
         Returns:
-            What the rig's sensors measure, and what counts from a trial's start (SI), shape
-            (rows,) each: of a station contraction, rotation, load, pressure and extension.
+            Measured quantities and those relative to the trial's start (SI), shape (rows,) each:
+            for a station contraction, rotation, load, pressure and extension.
         """
         states = np.ascontiguousarray(states, float)
         out = np.empty((states.shape[0], len(self.outputs)))
@@ -119,13 +119,13 @@ class CompiledModel:
         return truth | counted
 
     def extrapolates(self, pressure: float) -> bool:
-        """Whether a pressure (Pa) lies outside what the model was identified on."""
+        """Whether a pressure (Pa) lies outside the range of the model's identification."""
         valid = self.model.parameters["validity"]
         return not valid.lowest <= pressure <= valid.highest
 
 
 def regulator_voltage(model: Model, pressure: float) -> float:
-    """Regulator voltage (V) of a model that settles at a pressure (Pa).
+    """Regulator voltage (V) of a model for a steady pressure (Pa).
 
     Raises:
         ValueError: if the regulator would need less than 0 or more than 10 V.
@@ -143,10 +143,10 @@ def regulator_voltage(model: Model, pressure: float) -> float:
 
 
 def check_tolerance(tolerance: object) -> None:
-    """Refuse what is no tolerance of the integrator.
+    """Reject an invalid tolerance of the integrator.
 
     Raises:
-        ValueError: it is no number, or too small or large for one.
+        ValueError: the tolerance is not a number, or is too small or too large.
     """
     # `not`: NaN is out of every range, as is true or false.
     if not (isinstance(tolerance, int | float | np.floating) and 1e-10 <= tolerance <= 0.1):

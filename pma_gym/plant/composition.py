@@ -1,8 +1,8 @@
-"""A plant's equations of motion while they are being put together from the laws of its effects.
+"""Assembly of a plant's equations of motion from the laws of its effects.
 
-A plant (`station.py`, `cascade.py`) says which ports it has and how their results balance; the
-effects that a model has fill the ports. What comes out is traced arithmetic, from which compiled
-code, Python text and derivatives are made.
+A rig (`station.py`, `cascade.py`) defines its ports and how their results balance; the model's
+effects fill the ports. The result is a traced expression graph, the source of compiled code, Python
+text and derivatives.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -17,15 +17,15 @@ from pma_gym.effects.effect import Parameters, signals
 from pma_gym.integrator.equations import Breakpoint, Equations, Interpolation, RateIndependentState
 
 LAG_SHARE = 5.0
-"""Tolerance of a sensor's lag beside that of its output, which it follows where that is slow."""
+"""Tolerance of a sensor's lag relative to that of its output."""
 
 
 class PlantEquations(Equations):
-    """A plant's right-hand side, put together from the laws of its effects.
+    """The right-hand side of a plant, assembled from the laws of its effects.
 
     Args:
         effects: the model's effects by name.
-        parameters: their parameters by name; only how many there are matters here.
+        parameters: their parameters by effect; only their number matters here.
         interpolation: of the commands between rows: "foh" (linear in time) or "zoh" (held).
 
     Attributes:
@@ -46,7 +46,7 @@ class PlantEquations(Equations):
         return [effect for effect in self.effects.values() if effect.port == port]
 
     def call(self, effect: Effect, law: Callable, **other: Value) -> Any:  # noqa: ANN401
-        """What a law returns; `other` gives a signal another value."""
+        """Return the value of a law; `other` replaces signals by other values."""
         own = {"p": self.parameters[effect.name], **other}
 
         def signal(name: str) -> Value:
@@ -59,7 +59,7 @@ class PlantEquations(Equations):
         return trace(law, *(signal(name) for name in signals(law)))
 
     def memory(self, effect: Effect) -> Any:  # noqa: ANN401
-        """The memory of an effect; one of the way travelled, as far as the step has come."""
+        """Return an effect's state; a rate-independent one at the present point of the step."""
         if effect.rate_independent_law is None:
             values = tuple(self[name] for name in effect.memory_names)
             return values if effect.memories > 1 else values[0]
@@ -110,14 +110,14 @@ class PlantEquations(Equations):
         return longest
 
     def total(self, port: str) -> Value:
-        """The sum over the effects at a port."""
+        """Sum over the effects at a port."""
         terms: list[Value] = [
             self.call(effect, effect.law) for effect in self.at(port) if effect.law
         ]
         return sum(terms[1:], terms[0]) if terms else self.graph.constant(0.0)
 
     def product(self, port: str) -> Value:
-        """The product over the effects at a port."""
+        """Product over the effects at a port."""
         factor = self.graph.constant(1.0)
         for effect in self.at(port):
             if effect.law:
@@ -125,11 +125,11 @@ class PlantEquations(Equations):
         return factor
 
     def chain(self, port: str, name: str, value: Value) -> Value:
-        """A value that the effects at a port change one after the other, in catalogue order.
+        """Apply the effects at a port to a value one after the other, in catalogue order.
 
         Args:
             port: the port.
-            name: the signal by which their laws know the value.
+            name: the signal that holds the value in their laws.
             value: the value before them.
         """
         for effect in self.at(port):
@@ -138,13 +138,13 @@ class PlantEquations(Equations):
         return value
 
     def one(self, port: str, **other: Value) -> Any:  # noqa: ANN401
-        """What the law of the only effect at a port returns."""
+        """Return the value of the law of the only effect at a port."""
         (effect,) = self.at(port)
         assert effect.law is not None
         return self.call(effect, effect.law, **other)
 
     def passed(self, port: str, name: str) -> Value:
-        """A named value as the effect at a port passes it on; as it is if there is none."""
+        """Return a value after the effect at a port; unchanged if there is none."""
         return self.one(port) if self.at(port) else self[name]
 
     def add_decaying(
@@ -155,12 +155,11 @@ class PlantEquations(Equations):
         self.add_state(name, source - decay * self[name] + self.total(beside), scale)
 
     def add_memories(self, ports: Sequence[str], scales: Mapping[str, float] | None = None) -> None:
-        """Add the memory of every effect that has one at these ports.
+        """Add the states of the effects at these ports.
 
         Args:
             ports: the ports.
-            scales: what errors of memories are counted against by port, where it is not the
-                effect's own scale.
+            scales: error scale of the states by port, where it differs from the effect's scale.
         """
         for effect in self.effects.values():
             if effect.port in ports and effect.rate:
@@ -174,16 +173,16 @@ class PlantEquations(Equations):
             self.add_decaying(name, rate, scale)
 
     def add_breakpoints(self) -> None:
-        """Add the bends of the effects' laws; all states must have been added."""
+        """Add the breakpoints of the effects' laws; all states must have been added."""
         for effect in self.effects.values():
             if effect.breakpoint:
                 value = self.call(effect, effect.breakpoint)
                 self.breakpoints.append(Breakpoint(value, self._slope(value)))
 
     def add_sensors(self, scales: Mapping[str, float]) -> None:
-        """Add the lag of every sensor, by what an error of its output is counted against.
+        """Add the lag of every sensor, with the error scales of their outputs.
 
-        It follows its output, and whatever errors stand at the same port, with their memories.
+        A lag's input is the output plus the errors at the same port; their states are added too.
         """
         for effect in self.effects.values():
             if effect.port.startswith("sensor:") and effect.rate and not effect.law:

@@ -1,4 +1,4 @@
-"""Where a plant stands: its state, its time, the commands that it received last."""
+"""The condition of a running plant: its state, its time and its last commands."""
 
 import math
 from dataclasses import dataclass
@@ -14,15 +14,15 @@ from pma_gym.plant.sensors import direct_command
 
 @dataclass
 class Condition:
-    """Where a plant stands.
+    """State, time and last commands of a plant.
 
     Attributes:
         state: the state vector (SI), changed in place by `Plant.step`.
-        zero_contraction: contraction x0 at which the trial began with no load (m); extension is
-            counted from it.
+        zero_contraction: contraction x0 without load at the trial's start (m), the zero of
+            extension.
         time: time since the trial began (s).
-        size: size that the next internal step will have (s), if its error allows.
-        commands: motor and regulator voltage that it received last (V), or None.
+        size: proposed size of the next internal step (s).
+        commands: last motor and regulator voltage (V), or None.
     """
 
     state: np.ndarray
@@ -32,7 +32,7 @@ class Condition:
     commands: tuple[float, float] | None = None
 
     def receive(self, motor_voltage: float, regulator_voltage: float) -> None:
-        """Take commands (V) in: where they jump, the next internal step begins smaller."""
+        """Set the commands (V); after a jump the next internal step begins smaller."""
         commands = (motor_voltage, regulator_voltage)
         before = self.commands or commands
         jump = max(abs(new - old) for new, old in zip(commands, before, strict=True))
@@ -40,14 +40,14 @@ class Condition:
 
 
 def check_commands(model: Model, motor: float, regulator: float) -> None:
-    """Refuse commands that no drive or regulator takes.
+    """Reject commands outside the range of drive or regulator.
 
     Args:
-        model: says whether its drive takes a voltage of 0-10 V, or its command as it comes.
-        motor: the motor's command (V, or SI of what its drive takes).
+        model: defines whether the drive takes a voltage of 0-10 V or a command in SI.
+        motor: the motor's command (V, or the SI unit of the drive's command).
         regulator: the regulator's (V).
     Raises:
-        ValueError: names the command, what came, and what may.
+        ValueError: with the command, its value and its range.
     """
     direct = direct_command(model)
     if direct:

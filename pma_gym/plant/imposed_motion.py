@@ -1,11 +1,10 @@
-"""The motion that a record of positions stands for: smooth, with its velocity, and without a lag.
+"""Smooth motion, with its velocity and without a lag, from a noisy record of positions.
 
-A record of positions is noisy, and differences of it are more so. The motion is the natural cubic
-spline s that makes least
+The motion is the natural cubic spline s that minimises
 
     sum w_i (y_i - s(t_i))^2 + lambda int s''^2 dt,   lambda = (2 pi bandwidth)^-4
 
-(Reinsch 1967), which passes slow motion, halves the amplitude at the bandwidth and shifts nothing.
+(Reinsch 1967). It passes slow motion, halves the amplitude at the bandwidth and has no phase shift.
 """
 
 import numpy as np
@@ -16,14 +15,14 @@ Array = NDArray[np.float64]
 
 
 def smoothed(time: Array, values: Array, bandwidth: float) -> tuple[Array, Array, Array]:
-    """The smooth motion of a record.
+    """Smooth a record, and return its first and second derivative.
 
     Args:
         time: increasing times (s), shape (n,).
         values: the record (SI), shape (n,).
         bandwidth: frequency (Hz) at which its amplitude is halved.
     Returns:
-        The motion, its rate and the rate of that (SI), shape (n,) each.
+        The motion and its first and second derivative (SI), shape (n,) each.
     """
     rows = len(time)
     if rows < 3:
@@ -56,13 +55,13 @@ def smoothed(time: Array, values: Array, bandwidth: float) -> tuple[Array, Array
 
 
 def motion_command(time: Array, positions: Array, bandwidth: float, corner: float) -> Array:
-    """Command at which states with two equal poles are on the smooth motion of a record.
+    """Command with which states with two equal poles follow the smooth motion of a record.
 
     Args:
         time: increasing times (s), shape (n,).
         positions: the record (m), shape (n,).
-        bandwidth: of the motion (Hz).
-        corner: of the states (rad/s).
+        bandwidth: bandwidth of the motion (Hz).
+        corner: corner frequency of the states (rad/s).
     """
     motion, rate, curvature = smoothed(time, positions, bandwidth)
     command = motion + (2.0 * rate + curvature / corner) / corner
@@ -72,7 +71,7 @@ def motion_command(time: Array, positions: Array, bandwidth: float, corner: floa
 
 
 def level_command(time: Array, levels: Array, bandwidth: float, corner: float) -> Array:
-    """The same for a state with one pole, such as a measured pressure."""
+    """Command with which a state with one pole, such as a pressure, follows a smoothed record."""
     level, rate, _ = smoothed(time, levels, bandwidth)
     command = level + rate / corner
     command[0] = level[0]

@@ -1,11 +1,10 @@
-"""Where memories stand when a trial begins: as the model says, as the trial says, or fitted.
+"""Initial hysteresis state of a trial: from the model, from the trial, or fitted.
 
-A muscle that was filled and has contracted stands on one branch of its hysteresis, one that was
-stretched before stands on another, and no log says which. So a fit leaves the start of a memory
-free in every trial, between 0 (no way remembered) and 1 (filled and contracted): every trial is
-simulated once more with another start, and each simulation is moved along the difference to where
-it meets the readings best. Hysteresis is linear in its memory at the start as long as the motion
-is the same, so the difference holds from one end to the other.
+After filling and contracting, a muscle is on one branch of its hysteresis; after a stretch it is on
+another. Logs do not record the branch. A fit therefore estimates the initial state of every trial,
+between 0 (no history) and 1 (filled and contracted): it simulates every trial a second time with
+another initial state and interpolates between both simulations to fit the measurements. For equal
+motion, hysteresis is linear in its initial state, so the interpolation is valid over the range.
 """
 
 from collections.abc import Sequence
@@ -20,19 +19,19 @@ from pma_gym.plant.model import Model
 Array = NDArray[np.float64]
 
 PRIOR = (0.0, 1.0)
-"""Between which a memory of a measured trial begins, each value as likely as the other."""
+"""Range of the initial state of a measured trial, with a uniform prior."""
 
 MIDDLE, MOVE = 0.5, 0.25
-"""Where measured trials are simulated from, and how much further once more."""
+"""Initial state of the first simulation of a measured trial, and its change for the second."""
 
 
 def memory_starts(model: Model) -> tuple[str, ...]:
-    """Paths of the parameters that say where memories begin, `effect.parameter`."""
+    """Paths of the parameters that give initial states of effects, `effect.parameter`."""
     return tuple(dict.fromkeys(memory_states(model).values()))
 
 
 def memory_states(model: Model) -> dict[str, str]:
-    """The same paths, by the state that begins there."""
+    """Paths of the parameters that give initial states, keyed by the state."""
     return {
         state: f"{name}.{door}"
         for name, effect in model.effects.items()
@@ -43,7 +42,7 @@ def memory_states(model: Model) -> dict[str, str]:
 
 
 def memory_at_start(model: Model) -> float | None:
-    """Where a model's trials begin; None for a model that has nothing to begin with.
+    """Initial hysteresis state of a model's trials; None for a model without such a state.
 
     >>> from pma_gym.plant.model import load_model
     >>> memory_at_start(load_model("serres2008")) is None
@@ -56,15 +55,14 @@ def memory_at_start(model: Model) -> float | None:
 
 
 def begun_at(model: Model, memory_at_start: float | None) -> Model:
-    """A model whose trials begin with their memories at a value.
+    """Return the model with another initial hysteresis state.
 
     Args:
-        model: the model.
-        memory_at_start: -1 to 1; 1: the muscle was filled and has contracted; None: as the model
-            says.
+        model: the model; a model without hysteresis is returned unchanged.
+        memory_at_start: -1 to 1, where 1 is a muscle that was filled and has contracted; None keeps
+            the model's value.
     Raises:
-        TrialError: a value that no memory has. A model without hysteresis takes any other and
-            stays as it is: it has nothing to begin with.
+        TrialError: a value out of range.
     """
     if memory_at_start is None:
         return model
@@ -73,13 +71,13 @@ def begun_at(model: Model, memory_at_start: float | None) -> Model:
 
 
 def first_guesses(trials: Sequence[Trial]) -> Array:
-    """Where memories begin in simulations of trials: as a trial says, else in the middle."""
+    """Initial states for simulations of trials: from the trial, else the middle of the range."""
     given = [trial.memory_at_start for trial in trials]
     return np.array([MIDDLE if one is None else one for one in given], float)
 
 
 def reach(trial: Trial) -> tuple[float, float]:
-    """How far a trial's simulation may be moved, in moves; no way where the trial says it."""
+    """Range of the interpolation between two simulations; empty if the trial gives the state."""
     if trial.memory_at_start is not None:
         return 0.0, 0.0
     low, high = PRIOR
@@ -87,14 +85,14 @@ def reach(trial: Trial) -> tuple[float, float]:
 
 
 def best_shares(left: Array, along: Array, ends: tuple[float, float]) -> Array:
-    """How many moves bring each simulation nearest to the readings.
+    """Find the shares of the second simulation that fit the measurements best.
 
     Args:
-        left: what each leaves, simulated less measured in units of noise, shape (tried, n).
-        along: what one move changes, in the same units, shape (n,).
-        ends: least and most moves.
+        left: residuals, simulated minus measured in units of noise, shape (tried, n).
+        along: change of the residuals by the full difference, in the same units, shape (n,).
+        ends: smallest and largest share.
     Returns:
-        Shape (tried,); 0 where a move changes nothing.
+        Shape (tried,); 0 where the difference has no effect.
     """
     size = float(along @ along)
     if not np.isfinite(size) or size == 0.0:

@@ -1,4 +1,4 @@
-"""Models: which effects a plant has, with which parameters; TOML files in, TOML files out."""
+"""Models: a plant's effects with their parameters, read from and written to TOML files."""
 
 import difflib
 import reprlib
@@ -29,7 +29,7 @@ _HEAD = ("schema", "name", "title", "plant")
 
 
 class ModelError(ValueError):
-    """A model that cannot be used; says what is wrong, where, and how to mend it."""
+    """Invalid model; the message has the error, its place and the fix."""
 
 
 @dataclass(frozen=True)
@@ -38,10 +38,10 @@ class Model:
 
     Attributes:
         name: short name.
-        title: one line for people.
+        title: one line of description.
         plant: name of its rig: `station`, `cascade` or `slide`.
         parameters: NamedTuple of parameters (SI) by effect name, in catalogue order.
-        notes: source and interval by `effect.parameter_unit`.
+        notes: source and interval, keyed by `effect.parameter_unit`.
     """
 
     name: str
@@ -60,7 +60,7 @@ class Model:
         _check_ports(self)
 
     def __reduce__(self) -> tuple[type["Model"], tuple[object, ...]]:
-        """Copy and send to other processes by construction: a read-only mapping cannot be."""
+        """Copy and pickle by construction, because a read-only mapping cannot be pickled."""
         groups = (dict(self.parameters), dict(self.notes))
         return Model, (self.name, self.title, self.plant, *groups)
 
@@ -71,7 +71,7 @@ class Model:
 
     @property
     def rig(self) -> Rig:
-        """The rig that the model is of."""
+        """The model's rig."""
         return RIGS[self.plant]
 
     def vector(self) -> np.ndarray:
@@ -83,17 +83,17 @@ class Model:
         return np.array(flat, dtype=np.float64)
 
     def lengths(self) -> dict[str, list[int]]:
-        """By effect: 0 for a number, the length for a tuple, one entry a parameter."""
+        """Lengths of parameters by effect: 0 for a number, the number of entries for a row."""
         return {
             name: [len(v) if isinstance(v, tuple) else 0 for v in values]
             for name, values in self.parameters.items()
         }
 
     def replace(self, values: Mapping[str, Value], name: str | None = None) -> "Model":
-        """A model with other values, given by `effect.parameter_unit` in the unit in files.
+        """Return a model with other values, keyed by `effect.parameter_unit`, in file units.
 
         Raises:
-            ModelError: an unknown parameter (with the nearest known) or one out of bounds.
+            ModelError: an unknown parameter (with the nearest known name) or one out of bounds.
         """
         given: dict[str, dict[str, Value]] = {}
         known = set(self.paths())
@@ -114,16 +114,15 @@ class Model:
     def with_effects(
         self, effects: Mapping[str, Mapping[str, Value]] | Iterable[str], name: str | None = None
     ) -> "Model":
-        """A model with effects of the catalogue added; the order given does not matter.
+        """Return a model with effects of the catalogue added, in any order.
 
         Args:
-            effects: values by effect and `parameter_unit`, in the unit in files; or names
-                alone. What is not given is as the model has it, else neutral: the effect is there
-                and does nothing.
+            effects: values by effect and `parameter_unit`, in file units; or only names. Other
+                parameters keep the model's values, or are neutral, so that the effect is inactive.
             name: name of the new model; this one's if not given.
         Raises:
-            ModelError: an unknown effect or parameter, one out of bounds, one that is neither
-                given nor neutral, or an effect that this plant does not take.
+            ModelError: an unknown effect or parameter, one out of bounds, a missing value without
+                a neutral one, or an effect that does not fit this rig.
 
         Example:
             >>> drags = load_model("serres2008").with_effects({"hysteresis": {"force_n": 12.0}})
@@ -169,11 +168,11 @@ class Model:
             raise ModelError(str(error)) from error
 
     def at_the_door(self, effect: str) -> dict[str, Value]:
-        """One effect's values by their names in files."""
+        """An effect's values, keyed by their names in files."""
         return CATALOGUE[effect].at_the_door(self.parameters[effect])
 
     def rows(self) -> Iterator[ParameterRow]:
-        """Every parameter with its interval, unit and source, in the order of files."""
+        """All parameters with interval, unit and source, in the order of files."""
         for effect in self.parameters:
             stems = CATALOGUE[effect].names_at_the_door()
             for door, value in self.at_the_door(effect).items():
@@ -184,7 +183,7 @@ class Model:
                 )
 
     def _repr_html_(self) -> str:
-        """What a notebook shows: a table of effects and parameters."""
+        """Table of effects and parameters for notebooks."""
         from pma_gym.pages.document import TextTable
         from pma_gym.pages.notebook import notebook_html
 
@@ -197,7 +196,7 @@ class Model:
         return notebook_html([TextTable(title, header, rows, words=2)])
 
     def paths(self) -> Iterator[str]:
-        """Every parameter as `effect.parameter_unit`."""
+        """All parameters as `effect.parameter_unit`."""
         for effect in self.parameters:
             yield from (f"{effect}.{name}" for name in CATALOGUE[effect].names_at_the_door())
 
@@ -207,17 +206,17 @@ class Model:
 
 
 def shipped_models() -> dict[str, Path]:
-    """Paths of the models that come with the package, by name."""
+    """Paths of the package's models, keyed by name."""
     folder = Path(str(resources.files("pma_gym") / "models"))
     return {path.stem: path for path in sorted(folder.glob("*.toml"))}
 
 
 def load_model(source: "str | Path | Model") -> Model:
-    """A model by its shipped name, by the path of a TOML file, or as it is.
+    """Load a model by its shipped name or the path of a TOML file; return a Model unchanged.
 
     Raises:
-        ModelError: no such model, broken TOML, another schema, an unknown or missing effect or
-            parameter, a value out of bounds or not a number; names the file and the mend.
+        ModelError: no such model, invalid TOML, another schema, an unknown or missing effect or
+            parameter, a value out of bounds or not a number; with the file and the fix.
     """
     if isinstance(source, Model):
         return source
@@ -251,7 +250,7 @@ def _read(path: Path) -> Model:
 
 
 def parse_model(document: Mapping[str, Any]) -> Model:
-    """A model from a parsed TOML document.
+    """Make a model from a parsed TOML document.
 
     Raises:
         ModelError: as `load_model`.
@@ -369,7 +368,7 @@ def _check_port(model: Model, name: str, port: Port) -> None:
 
 
 def dump_model(model: Model) -> str:
-    """The model as TOML text; the same model gives the same bytes."""
+    """Return the model as TOML text; equal models give equal bytes."""
     lines = [f"schema = {SCHEMA}"]
     lines += [f"{key} = {toml_text(getattr(model, key))}" for key in ("name", "title", "plant")]
     for effect in model.parameters:

@@ -1,4 +1,4 @@
-"""Parameters of a model as people read them: value, interval, unit and source."""
+"""Parameters of a model for display: value, interval, unit and source."""
 
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -8,7 +8,7 @@ from pma_gym.effects.effect import Value
 
 @dataclass(frozen=True)
 class Note:
-    """What is known about a parameter's value, in its unit in files.
+    """Source and interval of a parameter's value, in file units.
 
     Attributes:
         source: where the value comes from.
@@ -22,15 +22,15 @@ class Note:
 
 
 class ParameterRow(NamedTuple):
-    """A parameter as people read it.
+    """A parameter for display.
 
     Attributes:
-        effect: that it belongs to.
+        effect: its effect.
         parameter: its name, without unit.
-        value: in `unit`; several numbers of a table.
+        value: value in `unit`; several numbers for a row.
         low: lower end of its 95 % interval, or None.
         high: upper end, or None.
-        unit: in files.
+        unit: unit in files.
         source: where the value comes from.
     """
 

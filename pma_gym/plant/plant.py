@@ -1,4 +1,4 @@
-"""A plant that runs: settles, steps, simulates whole trials."""
+"""The class `Plant`: equilibrium, steps and whole trials of a model."""
 
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 class Plant(CompiledModel):
-    """A plant: settles, steps, simulates trials, is linearised.
+    """Find equilibria of a model, step it, simulate trials and linearise it.
 
     Its arguments and attributes are those of `CompiledModel`.
 
@@ -38,14 +38,12 @@ class Plant(CompiledModel):
         pressure: float | None = None,
         regulator_voltage: float | None = None,
     ) -> Condition:
-        """The plant at rest at constant commands, memories as the model says that trials begin.
+        """Return the equilibrium at constant commands, with the model's initial hysteresis states.
 
         Args:
             motor_voltage: motor command (V).
-            pressure: gauge pressure (Pa); or instead
+            pressure: gauge pressure (Pa), as an alternative to the regulator's voltage.
             regulator_voltage: regulator command (V).
-        Returns:
-            The settled condition.
         Raises:
             ValueError: neither pressure nor regulator voltage, a voltage out of 0-10 V, a pressure
                 that the regulator does not reach, or a load that the muscle cannot balance.
@@ -63,13 +61,13 @@ class Plant(CompiledModel):
         regulator_voltage: float,
         duration: float,
     ) -> None:
-        """Hold the commands for a while; changes the condition in place.
+        """Advance the condition in place under constant commands.
 
         Args:
-            condition: where the plant stands.
+            condition: present condition, changed in place.
             motor_voltage: motor command (V).
             regulator_voltage: regulator command (V).
-            duration: how long (s).
+            duration: time span (s).
         Raises:
             ValueError: a voltage out of 0-10 V, or a duration that is not positive.
         """
@@ -101,7 +99,7 @@ class Plant(CompiledModel):
         interpolation: Interpolation = "foh",
         condition: Condition | None = None,
     ) -> tuple[np.ndarray, float]:
-        """States at each time under given commands.
+        """Return the states at given times under given commands.
 
         Args:
             time: increasing times (s), shape (n,).
@@ -109,9 +107,9 @@ class Plant(CompiledModel):
             regulator_voltage: regulator commands (V), shape (n,).
             interpolation: of the commands between rows: "foh" (first-order hold, linear) or
                 "zoh" (each held until the next).
-            condition: where to begin; settled at the first commands if not given.
+            condition: initial condition; the equilibrium at the first commands if not given.
         Returns:
-            States of shape (n, states) and the contraction x0 that extension counts from (m).
+            States, shape (n, states), and the contraction x0 that is the zero of extension (m).
         """
         check_interpolation(interpolation)
         first = condition or self.settle(
@@ -137,23 +135,23 @@ class Plant(CompiledModel):
         seed: int | None = 0,
         interpolation: Interpolation = "foh",
     ) -> Trial:
-        """Run a trial's commands and log what the station's sensors would.
+        """Simulate a trial's commands and return the trial with the sensors' measurements.
 
-        It begins settled at its first commands, memories as the trial says or, where it says
-        nothing, as the model does.
+        The simulation begins at the equilibrium of the first commands. Initial hysteresis states
+        come from the trial or, if it has none, from the model.
 
         Args:
             trial: time and commands: motor_voltage or load_command, regulator_voltage or
                 pressure_command.
-            noise: sensor noise and the DAQ's quantisation; the sensors' lag stays either way.
+            noise: add sensor noise and the DAQ's quantisation; the sensors' lag applies always.
             seed: seed of the noise.
             interpolation: of the commands between rows: "foh" (first-order hold, linear) or
                 "zoh" (each held until the next).
         Returns:
-            The trial with measurements and truth filled in.
+            The trial with measurements and true values.
         Raises:
-            ValueError: a command that is missing, or not given in the first row; a later empty cell
-                holds the value before it.
+            ValueError: a command is missing, or has no value in the first row; a later empty cell
+                keeps the value before it.
         """
         begun = begun_at(self.model, trial.memory_at_start)
         if begun != self.model:
@@ -174,7 +172,7 @@ class Plant(CompiledModel):
         )
 
     def lagged(self, states: np.ndarray, truth: Mapping[str, np.ndarray]) -> np.ndarray:
-        """What the sensors hold before noise, (rows, signals): the lag's state, or the truth."""
+        """Sensor outputs before noise, (rows, signals): the lag's state, or the true value."""
         columns = [
             states[:, at] if at >= 0 else truth[name]
             for at, name in zip(self.sensor_columns, self.outputs, strict=True)
@@ -182,20 +180,20 @@ class Plant(CompiledModel):
         return np.stack(columns, axis=1)
 
     def provenance(self, noise: bool, seed: int | None) -> dict[str, str]:
-        """What to write beside a result, so that it can be made again."""
+        """Return the data that reproduce a simulation: model, noise and seed."""
         return {"model": self.model.name, "noise": str(noise), "seed": str(seed)}
 
     def linearize(
         self, pressure: float, contraction: float, direction: str = "relaxing"
     ) -> "control.StateSpace":
-        """The plant near rest as a linear system; see `pma_gym.plant.forms.linear.linearize`."""
+        """Linearise about an equilibrium; see `pma_gym.plant.forms.linear.linearize`."""
         # Imported here: python-control takes longer to import than all of this package.
         from pma_gym.plant.forms.linear import linearize
 
         return linearize(self, pressure, contraction, direction)
 
     def symbolic(self) -> "dict[str, sympy.Expr]":
-        """The equations of motion; see `pma_gym.plant.forms.symbolic.symbolic`."""
+        """Return the equations of motion in SymPy; see `pma_gym.plant.forms.symbolic.symbolic`."""
         from pma_gym.plant.forms.symbolic import symbolic
 
         return symbolic(self)

@@ -1,7 +1,7 @@
-"""A plant's compiled functions: rates, outputs, balances, whole trials.
+"""Compiled functions of a plant: rates, outputs, balances, whole trials.
 
-They depend on a model's structure alone, its effects and the lengths of its rows; parameters come
-as a vector when they run. So a drawn station, or a fit's next guess, compiles nothing.
+They depend only on the structure of a model, that is its effects and the lengths of its rows. The
+parameters are a vector at run time, so that other parameter values need no compilation.
 """
 
 import ctypes
@@ -38,13 +38,13 @@ from pma_gym.plant.model import Model
 from pma_gym.plant.system import static_force, system
 
 FIRST_S = 7e-4
-"""First attempt at a step from rest (s)."""
+"""Size of the first step attempt from rest (s)."""
 
 _POINTER, _INTEGER, _REAL = ctypes.c_void_p, ctypes.c_int64, ctypes.c_double
 
 
 def parameter_names(model: Model) -> list[str]:
-    """Names of the inputs that a model's vector gives, in its order."""
+    """Names of the parameters in a model's vector, in order."""
     names = []
     for effect, lengths in model.lengths().items():
         fields = model.parameters[effect]._fields
@@ -55,7 +55,7 @@ def parameter_names(model: Model) -> list[str]:
 
 
 def structure(model: Model) -> list[str]:
-    """What a model's compiled functions depend on, beside this package's text."""
+    """Key of a model's compiled functions, apart from this package's source."""
     return [
         model.plant,
         *(f"{name} {lengths} {source_of(name)}" for name, lengths in model.lengths().items()),
@@ -66,13 +66,13 @@ class Program:
     """The compiled functions of all models of one structure.
 
     Args:
-        model: one of them.
+        model: one of the models.
 
     Attributes:
-        model: the model it was made for.
-        states: names of states and memories, in the order of the state vector.
+        model: the model given.
+        states: names of all states, in the order of the state vector.
         outputs: names of the true outputs.
-        offsets: where a model's vector has which number; the tolerance comes first.
+        offsets: position of every number in a model's vector; the tolerance is the first.
     """
 
     def __init__(self, model: Model) -> None:
@@ -85,33 +85,33 @@ class Program:
         self._functions()
 
     def __reduce__(self) -> "tuple[Callable[[Model], Program], tuple[Model]]":
-        """Copy and pickle by structure: compiled functions belong to their process."""
+        """Copy and pickle by structure, because compiled functions belong to one process."""
         return program, (self.model,)
 
     def key(self) -> list[str]:
-        """What the compiled functions depend on, beside this package's text."""
+        """Key of the compiled functions, apart from this package's source."""
         return structure(self.model)
 
     @cached_property
     def zero_order_hold(self) -> System:
-        """The system with a zero-order hold of the commands."""
+        """The equations with a zero-order hold of the commands."""
         return system(self.model, "zoh")
 
     @cached_property
     def first_order_hold(self) -> System:
-        """The system with a first-order hold of the commands."""
+        """The equations with a first-order hold of the commands."""
         return system(self.model, "foh")
 
     @cached_property
     def equations(self) -> PlantEquations:
-        """The equations with commands held, without the arithmetic of a step."""
+        """The equations with constant commands, without the arithmetic of a step."""
         equations = PlantEquations(self.model.effects, self.model.parameters)
         self.model.rig.write_equations(equations)
         return equations
 
     @cached_property
     def states(self) -> tuple[str, ...]:
-        """Names of states and memories, in the order of the state vector."""
+        """Names of all states, in the order of the state vector."""
         return tuple(state.name for state in self.equations.remembered)
 
     def _functions(self) -> None:
@@ -135,16 +135,16 @@ class Program:
 
     @cached_property
     def simulate_one(self) -> Callable:
-        """Simulates whole trials one after the other; see `write_simulate`."""
+        """Compiled function that simulates trials one after the other; see `write_simulate`."""
         return self._simulate(1)
 
     @cached_property
     def simulate_many(self) -> Callable:
-        """Simulates whole trials, one in every lane; see `write_simulate`."""
+        """Compiled function that simulates one trial per SIMD lane; see `write_simulate`."""
         return self._simulate(simd_lanes())
 
     def _simulate(self, width: int) -> Callable:
-        """A library of its own: who simulates many trials of a model seldom simulates one."""
+        """Build a separate library, because few users need both the scalar and SIMD simulation."""
 
         def build() -> Module:
             module = Module()
@@ -156,7 +156,7 @@ class Program:
         return library.function(f"simulate_{width}", [_INTEGER, *[_POINTER] * 3])
 
     def parameters(self, builder: Builder, vector: Operand, values: list[Value]) -> dict:
-        """The inputs of level FIXED that values depend on, loaded from a vector.
+        """Load the inputs of level FIXED that values depend on from a vector.
 
         The vector begins with the tolerance.
         """
@@ -167,7 +167,7 @@ class Program:
         }
 
     def _table(self, module: Module) -> None:
-        """Everything that is fixed for a model, from its vector."""
+        """Compute the constants of a model from its vector."""
         fixed = self.first_order_hold.layout.fixed
         b, (vector, out) = function(module, "table", [("vector", POINTER), ("out", POINTER)])
         # Without fused products: the table may be made in other ways, of the same bits.
@@ -203,7 +203,7 @@ class Program:
         b.ret_void()
 
     def rates(self) -> list[Value]:
-        """Rates of all states and memories, where a step begins."""
+        """Rates of all states at the start of a step."""
         return rates(self.equations)
 
     def _observe(self, module: Module) -> None:
@@ -252,7 +252,7 @@ class Program:
 
 
 HALVINGS = 60
-"""Halvings of a bracket of some 160 mm: to the last bit."""
+"""Bisections of a bracket of about 160 mm, down to the last bit."""
 
 
 def balanced(
@@ -263,15 +263,15 @@ def balanced(
     load: Operand,
     reach: Sequence[Operand],
 ) -> Operand:
-    """Write a search for the contraction at which a force has a value; returns it.
+    """Write code that finds the contraction at which the muscle's force equals a load.
 
     Args:
-        b: where to write.
+        b: code builder.
         eq: the equations.
         force: the muscle's force, which falls with contraction (N).
-        known: its inputs but the contraction, by id.
-        load: the value (N).
-        reach: greatest stretch and contraction (m); twice these is where it searches.
+        known: the other inputs of the force, by id.
+        load: the load (N).
+        reach: greatest stretch and contraction (m); the search covers twice this range.
     """
     low, high = memory(b, DOUBLE), memory(b, DOUBLE)
     b.store(b.fmul(real(-2.0), reach[0]), low)
@@ -292,7 +292,7 @@ _programs: dict[tuple[str, ...], Program] = {}
 
 
 def program(model: Model) -> Program:
-    """The compiled functions of a model's structure, made once."""
+    """Return the compiled functions of a model's structure, compiled once."""
     key = tuple(structure(model))
     if key not in _programs:
         _programs[key] = Program(model)
@@ -300,12 +300,12 @@ def program(model: Model) -> Program:
 
 
 def vector(model: Model, tolerance: float) -> np.ndarray:
-    """A model's numbers as compiled functions read them: the tolerance, then all parameters."""
+    """Return a model's vector for compiled functions: the tolerance, then all parameters."""
     return np.concatenate([[tolerance], model.vector()])
 
 
 def table(made: Program, numbers: np.ndarray) -> np.ndarray:
-    """Everything that is fixed for a model, from its vector."""
+    """Compute the constants of a model from its vector."""
     out = np.empty(made.table_size)
     made.table(numbers.ctypes.data, out.ctypes.data)
     return out

@@ -1,4 +1,4 @@
-"""What the DAQ logs: lagged signals plus noise, through the calibrations, quantised."""
+"""Measurements of the DAQ: lagged signals plus noise, through the calibrations, quantised."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -17,45 +17,45 @@ from pma_gym.plant.model import Model
 from pma_gym.units import SI_FACTORS
 
 _ROUNDING = 1e-9
-"""Volts by which a conversion may miss the range."""
+"""Tolerance (V) of a conversion at the ends of the range."""
 
 _MENDS = {
     "load_command": "write newtons, or give the drive another gain",
     "pressure_command": "write gauge pressure in kPa: 1 bar is 100, 1 psi 6.895, 1000 Pa 1",
 }
-"""What to do about a command out of range."""
+"""Fix for a command out of range, for messages."""
 
 _NO_PUSH = (
     "a cable pulls and cannot push; write newtons of pull, or, for a drive on a rigid link that "
     "pushes too, take a model of plant = 'slide' with [two_way_drive]"
 )
-"""What to do about a load below 0."""
+"""Fix for a load below 0, for messages."""
 
 SENSORS: dict[str, Signal] = {
     signal.sensor: signal for signal in SIGNALS.values() if signal.sensor and signal.is_measured
 }
-"""What each sensor measures, by the effect that it is."""
+"""Measured quantity of each sensor, keyed by the sensor's effect."""
 
 DAQ_CHANNELS = 4
-"""Least channels that noise is drawn for at every row, so that a seed gives a sensor the same noise
-in a rig that has fewer."""
+"""Smallest number of channels with drawn noise per row, so that a seed gives a sensor the same
+noise in rigs with fewer sensors."""
 
 
 def noise_levels(model: Model) -> np.ndarray:
-    """Standard deviations of a rig's sensors (SI), in the order of its signals; 0 without noise."""
+    """Noise standard deviations of a rig's sensors (SI), ordered as its signals; 0 for no noise."""
     sensors = [model.parameters.get(signal.sensor) for signal in model.rig.signals]
     return np.array([getattr(sensor, "noise", 0.0) for sensor in sensors])
 
 
 def resolutions(model: Model) -> np.ndarray:
-    """Steps in which a rig's signals are read (SI), in their order; 0 where none is known."""
+    """Quantisation steps of a rig's signals (SI), in order; 0 where unknown."""
     return np.array([signal.resolution for signal in model.rig.signals])
 
 
 def deviations(model: Model) -> np.ndarray:
-    """Standard deviations of a rig's readings (SI): its sensors' noise and the DAQ's rounding.
+    """Standard deviations of a rig's measurements (SI): sensor noise and the DAQ's quantisation.
 
-    1 of a signal that has neither: nothing is known of a sensor that the model lacks.
+    A signal without both has 1, because its sensor is not in the model.
     """
     known = np.hypot(noise_levels(model), resolutions(model) / np.sqrt(12.0))
     return np.where(known > 0.0, known, 1.0)
@@ -64,15 +64,15 @@ def deviations(model: Model) -> np.ndarray:
 def read(
     signals: Sequence[Signal], lagged: np.ndarray, levels: np.ndarray, normals: np.ndarray
 ) -> np.ndarray:
-    """Readings of sensors.
+    """Compute the measurements of sensors.
 
     Args:
-        signals: what they measure.
-        lagged: what the sensors hold, shape (..., signals) (SI).
+        signals: the measured signals.
+        lagged: sensor outputs before noise, shape (..., signals) (SI).
         levels: standard deviations, shape (signals,).
         normals: standard normal numbers, shape (..., signals).
     Returns:
-        Readings in SI; those that go through the DAQ quantised to its steps and held to its range.
+        Measurements in SI; those of the DAQ are quantised to its steps and limited to its range.
     """
     noisy = [
         reading(lagged[..., i], levels[i], normals[..., i], signal.calibration)
@@ -82,13 +82,13 @@ def read(
 
 
 def reading(lagged: Any, level: Any, normal: Any, line: Calibration | None) -> Any:  # noqa: ANN401
-    """One sensor's reading, of numbers, arrays or traced values.
+    """Compute one sensor's measurement from numbers, arrays or traced values.
 
     Args:
-        lagged: what the sensor holds (SI).
+        lagged: sensor output before noise (SI).
         level: standard deviation of its noise (SI).
         normal: standard normal number.
-        line: its calibration at the DAQ; None for a sensor that is not read by it.
+        line: its calibration at the DAQ; None for a sensor without the DAQ.
     """
     noisy = lagged + level * normal
     if line is None:
@@ -100,12 +100,12 @@ def reading(lagged: Any, level: Any, normal: Any, line: Calibration | None) -> A
 def measure(
     model: Model, lagged: np.ndarray, generator: np.random.Generator | None
 ) -> dict[str, np.ndarray]:
-    """Measurements by name, of shape (rows,) each; without a generator neither noisy nor quantised.
+    """Compute measurements by name, of shape (rows,) each.
 
     Args:
-        model: the model whose sensors measure.
-        lagged: what the sensors hold, shape (rows, signals) (SI).
-        generator: source of the noise, or None.
+        model: the model with the sensors.
+        lagged: sensor outputs before noise, shape (rows, signals) (SI).
+        generator: source of the noise; None for neither noise nor quantisation.
     """
     readings, signals = lagged, model.rig.signals
     if generator is not None:
@@ -116,11 +116,11 @@ def measure(
 
 
 def voltages(model: Model, trial: Trial) -> tuple[np.ndarray, np.ndarray]:
-    """Motor and regulator voltages of a trial, from loads and pressures if it commands those.
+    """Return a trial's motor and regulator voltages, converted from loads and pressures if needed.
 
     Raises:
-        TrialError: a command is missing, or is less than 0 or more than 0-10 V give; a
-            `SampleError` where it is one sample's.
+        TrialError: a command is missing, or is outside the range of 0-10 V; a `SampleError` if it
+            concerns one sample.
     """
     if model.rig.imposes_motion:
         return _imposed(model, trial)
@@ -138,7 +138,7 @@ def voltages(model: Model, trial: Trial) -> tuple[np.ndarray, np.ndarray]:
 
 
 def direct_command(model: Model) -> str:
-    """The command that a model's drive takes as it comes; "" where a line makes volts of it."""
+    """Command in SI that a model's drive takes directly; "" if it takes a voltage."""
     commands = model.rig.direct_commands.items()
     return next((command for drive, command in commands if drive in model.parameters), "")
 

@@ -1,4 +1,4 @@
-"""Whole trials, many at once: what simulations and fits run."""
+"""Simulation of many trials at once."""
 
 import os
 from collections.abc import Sequence
@@ -12,7 +12,7 @@ from pma_gym.integrator.trial_kernel import JOB
 from pma_gym.plant.program import FIRST_S, Program
 
 FEW = 4
-"""Fewer trials than this run in scalar code, whose single step is faster."""
+"""Below this number, trials run in scalar code, whose single step is faster."""
 
 
 @dataclass
@@ -24,12 +24,12 @@ class Run:
         motor: motor voltage at them (V), shape (rows,).
         regulator: regulator voltage at them (V), shape (rows,).
         interpolation: of the commands between rows: "foh" (linear) or "zoh" (held).
-        table: what is fixed for the model (`Plant.table`).
+        table: constants of the model (`Plant.table`).
         state: state vector at the first time.
-        zero_contraction: contraction x0 that the trial began at with no load (m).
+        zero_contraction: contraction x0 without load at the trial's start (m).
         size: size of the first internal step (s); afterwards that of the next.
-        states: the result: the state vector at each time, shape (rows, states); written to an
-            array that is there already if it has this shape.
+        states: the result: the state vector at each time, shape (rows, states); an existing array
+            of this shape is reused.
     """
 
     time: np.ndarray
@@ -44,16 +44,16 @@ class Run:
 
 
 def simulate_all(program: Program, runs: Sequence[Run], threads: int = 1) -> int:
-    """Simulate trials of models of one structure; each run gets its states.
+    """Simulate trials of models of one structure, and write the states to each run.
 
-    What becomes of a trial depends neither on the others nor on the number of threads.
+    The result of a trial depends neither on the others nor on the number of threads.
 
     Args:
         program: the compiled functions of their structure.
         runs: the trials.
-        threads: how many threads share them.
+        threads: number of threads.
     Returns:
-        How many attempts at internal steps were made, counting all lanes of a register as one.
+        Number of attempted internal steps; all lanes of a SIMD register count as one.
     Raises:
         ValueError: an unknown interpolation, a table of another structure, or columns of
             different lengths.
@@ -103,7 +103,7 @@ def simulate_all(program: Program, runs: Sequence[Run], threads: int = 1) -> int
 
 
 def processors() -> int:
-    """Processors that this process may use."""
+    """Number of processors that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 

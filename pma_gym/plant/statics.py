@@ -1,4 +1,4 @@
-"""The muscle at rest, for many pressures and loads at once: what fits and force maps ask for."""
+"""Static muscle forces and contractions for arrays of pressures and loads."""
 
 from collections.abc import Callable
 
@@ -9,17 +9,17 @@ from pma_gym.effects.effect import signals
 from pma_gym.plant.model import Model
 
 _HALVINGS = 48
-"""Halvings of a 120 mm bracket: to below 1e-12 mm."""
+"""Bisections of a 120 mm bracket, to below 1e-12 mm."""
 
 
 def muscle_force(model: Model) -> Callable[[np.ndarray, np.ndarray], np.ndarray]:
-    """Static force of a model's muscle, all memories at zero.
+    """Static force of a model's muscle, with all effects' states at zero.
 
     Args:
         model: a station's model.
     Returns:
-        Function of pressure (Pa) and contraction (m), arrays of one shape, giving the force (N),
-        positive when it shortens the muscle.
+        Function of pressure (Pa) and contraction (m), arrays of one shape, that returns the force
+        (N), positive when it shortens the muscle.
     """
     laws = []
     for effect in model.effects.values():
@@ -44,10 +44,10 @@ def contraction_at(
     shortest: float = -0.03,
     longest: float = 0.09,
 ) -> np.ndarray:
-    """Contraction at which a force law balances a load, by bisection; force falls with contraction.
+    """Find the contraction at which a force law balances a load, by bisection.
 
     Args:
-        force: function of pressure (Pa) and contraction (m) giving N.
+        force: function of pressure (Pa) and contraction (m) giving N; falls with contraction.
         pressure: gauge pressures (Pa), shape (n,).
         load: loads (N), shape (n,).
         shortest: lower end of the search (m).

@@ -11,7 +11,7 @@ from pma_gym.plant.model import Model
 
 
 def system(model: Model, interpolation: Interpolation) -> System:
-    """A model's equations and step; commands are interpolated by first- or zero-order hold."""
+    """Build a model's equations and step, with first- or zero-order hold of the commands."""
     equations = PlantEquations(model.effects, model.parameters, interpolation)
     model.rig.write_equations(equations)
     equations.finish()
@@ -20,7 +20,7 @@ def system(model: Model, interpolation: Interpolation) -> System:
 
 
 def memories_at_start(eq: PlantEquations) -> dict[str, Value]:
-    """The memories that do not begin at 0, as values of the model's parameters, by state."""
+    """Initial values of effects' states that do not begin at 0, from the parameters, by state."""
     return {
         name: getattr(eq.parameters[effect.name], effect.memory_start)
         for effect in eq.effects.values()
@@ -30,7 +30,7 @@ def memories_at_start(eq: PlantEquations) -> dict[str, Value]:
 
 
 def static_force(eq: PlantEquations) -> Value:
-    """Force of the muscle on the slide at rest, without the cable, memories as trials begin."""
+    """Force of the muscle on the slide at rest, without the cable, at the initial effect states."""
     force = eq["muscle_force"] + eq["slide_force"]
     nothing = eq.graph.constant(0.0)
     begun = memories_at_start(eq)

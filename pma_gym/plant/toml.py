@@ -1,4 +1,4 @@
-"""TOML of model files: values to text, and how a line of a model should be."""
+"""TOML of model files: conversion of values to text, and the expected form of a line."""
 
 import json
 
@@ -8,11 +8,11 @@ LINE_FORM = (
     'a line is a table, [effect], or name = value, the value a number 1.5, a text "in quotes" or '
     '{ value = 1.5, source = "where from" }'
 )
-"""How a line of a model file should be, for messages on one that is not."""
+"""Expected form of a line of a model file, for messages."""
 
 
 def toml_text(value: str | Value) -> str:
-    """A value as TOML has it.
+    """Convert a value to TOML text.
 
     >>> toml_text("50 %"), toml_text((1.0, 0.1 + 0.2))
     ('"50 %"', '[1, 0.3]')

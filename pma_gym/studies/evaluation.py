@@ -8,8 +8,8 @@ from rich.console import Console
 from rich.table import Table
 from scipy.stats import f as f_distribution
 
-from pma_gym.data.protocol import PROTOCOLS, Phase, Protocol
 from pma_gym.data.trial import Trial, TrialError
+from pma_gym.data.trial_schedule import SCHEDULES, Phase, TrialSchedule
 from pma_gym.metrics import (
     PHASE_SAMPLES,
     SAMPLE_RATE_HZ,
@@ -21,6 +21,8 @@ from pma_gym.metrics import (
 )
 from pma_gym.pages.document import Paragraph, TextTable
 from pma_gym.pages.notebook import notebook_html
+from pma_gym.renamed_keywords import old_keywords
+from pma_gym.renamed_names import renamed_attribute
 from pma_gym.units import SI_FACTORS
 
 LONGEST_GAP = 0.2
@@ -32,12 +34,13 @@ _SAME_TIME = 1e-5
 """Distance from the grid below which a sample counts as on it (s); logs round their times."""
 
 
+@old_keywords({"protocol": "schedule"})
 @dataclass(frozen=True)
 class Evaluation:
     """One phase of one trial; in SI, a table's units where it is printed.
 
     Attributes:
-        protocol: the task.
+        schedule: phases and ideal reference of the task.
         phase: the phase of it.
         regression: line through the position (m or rad) on the phase's own time (s).
         rmse: root mean square error against the ideal (m or rad).
@@ -46,16 +49,17 @@ class Evaluation:
         Serres 2008, tables 20-22 (displacement), 24-30 (rotation).
     """
 
-    protocol: Protocol
+    schedule: TrialSchedule
     phase: Phase
     regression: Regression
     rmse: float
     note: str = ""
+    protocol = renamed_attribute("protocol", "schedule")
 
     @property
     def percent_of_range(self) -> float:
         """RMSE in percent of the task's range, 25 mm or 90 deg."""
-        return percent_of_range(self.rmse, self.protocol.span)
+        return percent_of_range(self.rmse, self.schedule.span)
 
     @property
     def p_value(self) -> float:
@@ -69,7 +73,7 @@ class Evaluations(list[Evaluation]):
     @property
     def title(self) -> str:
         """Heading: the kind of trial that was scored."""
-        return f"Isokinetic {self[0].protocol.name}" if self else "No phases"
+        return f"Isokinetic {self[0].schedule.name}" if self else "No phases"
 
     def documents(self) -> list[dict[str, float | int | str]]:
         """A dictionary a phase, figures in the task's unit in files, all digits."""
@@ -113,14 +117,14 @@ def evaluate(trial: Trial, task: str = "displacement", use_truth: bool = False) 
     Raises:
         TrialError: unknown task, position not in the trial, log too short or with a gap too long.
     """
-    if task not in PROTOCOLS:
-        raise TrialError(f"task must be one of {', '.join(PROTOCOLS)}, got {task!r}")
-    protocol = PROTOCOLS[task]
-    position = _position(trial, protocol, use_truth)
+    if task not in SCHEDULES:
+        raise TrialError(f"task must be one of {', '.join(SCHEDULES)}, got {task!r}")
+    schedule = SCHEDULES[task]
+    position = _position(trial, schedule, use_truth)
     measured = ~np.isnan(position)
     time = trial.time - trial.time[0]
     known = time[measured], position[measured]
-    return Evaluations(_row(protocol, phase, *known) for phase in protocol.phases)
+    return Evaluations(_row(schedule, phase, *known) for phase in schedule.phases)
 
 
 def print_evaluation(rows: Evaluations, console: Console) -> None:
@@ -142,26 +146,26 @@ def print_evaluation(rows: Evaluations, console: Console) -> None:
         console.print(note, highlight=False)
 
 
-def _position(trial: Trial, protocol: Protocol, use_truth: bool) -> NDArray[np.float64]:
+def _position(trial: Trial, schedule: TrialSchedule, use_truth: bool) -> NDArray[np.float64]:
     """The position that the task asks for (m or rad), shape of the trial's time."""
     if not use_truth:
-        return trial.extension if protocol.followed.lengthens else trial.rotation
-    if protocol.quantity not in trial.truth:
+        return trial.extension if schedule.followed.lengthens else trial.rotation
+    if schedule.quantity not in trial.truth:
         raise TrialError(
-            f"the trial has no true {protocol.quantity}: only a simulation's Trial has it, a file "
+            f"the trial has no true {schedule.quantity}: only a simulation's Trial has it, a file "
             "does not; judge the measured one with use_truth=False"
         )
-    return trial.truth[protocol.quantity]
+    return trial.truth[schedule.quantity]
 
 
 def _row(
-    protocol: Protocol, phase: Phase, time: NDArray[np.float64], position: NDArray[np.float64]
+    schedule: TrialSchedule, phase: Phase, time: NDArray[np.float64], position: NDArray[np.float64]
 ) -> Evaluation:
     """The row of one phase, from measured samples only."""
-    grid = _grid(protocol, phase, time)
+    grid = _grid(schedule, phase, time)
     sampled = np.interp(phase.start + grid, time, position)
     return Evaluation(
-        protocol=protocol,
+        schedule=schedule,
         phase=phase,
         regression=regression(grid, sampled),
         rmse=rmse(sampled - phase.reference(grid)),
@@ -169,24 +173,26 @@ def _row(
     )
 
 
-def _grid(protocol: Protocol, phase: Phase, time: NDArray[np.float64]) -> NDArray[np.float64]:
+def _grid(schedule: TrialSchedule, phase: Phase, time: NDArray[np.float64]) -> NDArray[np.float64]:
     """The phase's own times that the log covers (s), at least up to its nominal end."""
     end = phase.start + phase.duration
     last = float(time[-1]) if time.size else 0.0
     # A log of the nominal length lacks the two samples that outlast the phase.
     if last < end - 1.0 / SAMPLE_RATE_HZ:
         raise TrialError(
-            f"phase {phase.name} of the {protocol.name} task needs {protocol.quantity} up to "
+            f"phase {phase.name} of the {schedule.name} task needs {schedule.quantity} up to "
             f"{end:g} s, the trial's last measured sample is at {last:.4g} s; "
             "log the whole task, or choose the task that was run"
         )
     own = phase_times()
     own = own[phase.start + own <= last + _SAME_TIME]
-    _check_gaps(protocol, phase.start + own, time)
+    _check_gaps(schedule, phase.start + own, time)
     return own
 
 
-def _check_gaps(protocol: Protocol, wanted: NDArray[np.float64], time: NDArray[np.float64]) -> None:
+def _check_gaps(
+    schedule: TrialSchedule, wanted: NDArray[np.float64], time: NDArray[np.float64]
+) -> None:
     """Refuse a phase that the log does not cover closely enough."""
     first = np.searchsorted(time, wanted[0], side="right")
     last = np.searchsorted(time, wanted[-1], side="left")
@@ -196,7 +202,7 @@ def _check_gaps(protocol: Protocol, wanted: NDArray[np.float64], time: NDArray[n
     widest = int(np.argmax(gaps))
     if gaps[widest] > LONGEST_GAP + _SAME_TIME:
         raise TrialError(
-            f"{protocol.quantity} must be measured at least every {LONGEST_GAP:g} s, the trial has "
+            f"{schedule.quantity} must be measured at least every {LONGEST_GAP:g} s, the trial has "
             f"nothing for {gaps[widest]:.3g} s from {known[widest]:.4g} s on; log it more often"
         )
 
@@ -219,7 +225,7 @@ def _note(phase: Phase, grid: NDArray[np.float64], time: NDArray[np.float64]) ->
 
 def _figures(row: Evaluation) -> list[tuple[str, str]]:
     """Labels and figures of the row, in the task's unit in files."""
-    line, unit = row.regression, row.protocol.unit
+    line, unit = row.regression, row.schedule.unit
     factor = SI_FACTORS[unit]
     chance = "<0.0001" if row.p_value < 1e-4 else f"{row.p_value:.4f}"
     return [
@@ -242,10 +248,10 @@ def _figures(row: Evaluation) -> list[tuple[str, str]]:
 
 def _document(row: Evaluation) -> dict[str, float | int | str]:
     """The row's figures by name with unit."""
-    line, unit, suffix = row.regression, row.protocol.unit, row.protocol.suffix
+    line, unit, suffix = row.regression, row.schedule.unit, row.schedule.suffix
     factor = SI_FACTORS[unit]
     return {
-        "task": row.protocol.name,
+        "task": row.schedule.name,
         "phase": row.phase.name,
         f"rmse_{suffix}": row.rmse / factor,
         "rmse_percent_of_range": row.percent_of_range,

@@ -17,7 +17,7 @@ Source:
 
 from dataclasses import dataclass
 
-from pma_gym.data.protocol import ROTATION
+from pma_gym.data.trial_schedule import ROTATION
 from pma_gym.tasks.operator import MomentProfile, Population
 from pma_gym.tasks.safety_filter import SafetyFilter
 from pma_gym.units import SI_FACTORS

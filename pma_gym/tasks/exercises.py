@@ -3,7 +3,7 @@
 import re
 from collections.abc import Sequence
 
-from pma_gym.data.protocol import ROTATION, Phase, Protocol
+from pma_gym.data.trial_schedule import ROTATION, Phase, TrialSchedule
 from pma_gym.tasks.exercise import PACE, SAFE_MOMENT, Exercise
 from pma_gym.tasks.operator import PACED, PACING, moment_profile
 from pma_gym.tasks.safety_filter import FILTER_PACED, FILTER_PACING
@@ -57,12 +57,12 @@ def moment_exercise(
     _check_knots(angles, moments)
     _check_pressures(start_pressures)
     phases = tuple(Phase(p.name, p.start, p.duration, 0.0, 0.0) for p in PACE.phases)
-    protocol = Protocol(name, "excess", "N m", max(moments), phases)
+    schedule = TrialSchedule(name, "excess", "N m", max(moments), phases)
     lowest, highest = TASKS["displacement"].lowest_pressure, TASKS["displacement"].highest_pressure
     exercise = Exercise(moment_profile(angles, moments), PACING, FILTER_PACING)
     return Task(
         name,
-        protocol,
+        schedule,
         lowest,
         highest,
         "regulator",

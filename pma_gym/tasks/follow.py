@@ -59,18 +59,18 @@ def infeasibility_reason(task: Task, model: str | Model, pressure: float) -> str
 
 
 def _times(task: Task) -> NDArray[np.float64]:
-    return np.arange(round(task.protocol.duration * SAMPLE_RATE_HZ) + 1) / SAMPLE_RATE_HZ
+    return np.arange(round(task.schedule.duration * SAMPLE_RATE_HZ) + 1) / SAMPLE_RATE_HZ
 
 
 def _jump(task: Task) -> str | None:
-    protocol = task.protocol
-    distances = np.abs(np.diff(protocol.reference(_times(task))))
-    far = distances > JUMP_SHARE * protocol.span
+    schedule = task.schedule
+    distances = np.abs(np.diff(schedule.reference(_times(task))))
+    far = distances > JUMP_SHARE * schedule.span
     if not np.any(far):
         return None
     at = int(np.argmax(far))
-    size = distances[at] / SI_FACTORS[protocol.unit]
-    return f"the reference jumps by {size:.3g} {protocol.unit} at {(at + 1) / SAMPLE_RATE_HZ:.4g} s"
+    size = distances[at] / SI_FACTORS[schedule.unit]
+    return f"the reference jumps by {size:.3g} {schedule.unit} at {(at + 1) / SAMPLE_RATE_HZ:.4g} s"
 
 
 class _Balance:
@@ -78,9 +78,9 @@ class _Balance:
 
     def __init__(self, task: Task, plant: Plant, pressure: float) -> None:
         self.plant, self.pressure, self.load = plant, pressure, task.load
-        self.rotates = task.protocol.followed.is_angle
+        self.rotates = task.schedule.followed.is_angle
         self.parameters = plant.model.parameters
-        self.wanted = task.protocol.reference(_times(task))
+        self.wanted = task.schedule.reference(_times(task))
 
     def of_motor(self) -> str | None:
         """What the motor lacks."""

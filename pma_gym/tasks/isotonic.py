@@ -6,7 +6,7 @@ stays.
 """
 
 from pma_gym.data.motions import triangle
-from pma_gym.data.protocol import Phase, Protocol
+from pma_gym.data.trial_schedule import Phase, TrialSchedule
 from pma_gym.tasks.task import Task
 from pma_gym.units import SI_FACTORS
 
@@ -43,8 +43,8 @@ def isotonic(
         Phase("II", part, part, initial=stroke, slope=0.0),
         Phase("III", 2.0 * part, part, initial=stroke, slope=-slope),
     )
-    protocol = Protocol(name, "contraction", "mm", stroke, phases)
-    return _task(protocol, load, start_pressures)
+    schedule = TrialSchedule(name, "contraction", "mm", stroke, phases)
+    return _task(schedule, load, start_pressures)
 
 
 def pressure_triangle(
@@ -65,16 +65,16 @@ def pressure_triangle(
         Phase(numeral, k * period, period, 0.0, 0.0, motion)
         for k, numeral in zip(range(periods), _NUMERALS, strict=False)
     )
-    protocol = Protocol(name, "contraction", "mm", stroke, phases)
-    return _task(protocol, load, (pressure, pressure))
+    schedule = TrialSchedule(name, "contraction", "mm", stroke, phases)
+    return _task(schedule, load, (pressure, pressure))
 
 
 _NUMERALS = ("I", "II", "III", "IV", "V", "VI", "VII", "VIII", "IX")
 
 
-def _task(protocol: Protocol, load: float, starts: tuple[float, float]) -> Task:
+def _task(schedule: TrialSchedule, load: float, starts: tuple[float, float]) -> Task:
     pressures = LOWEST_PRESSURE, HIGHEST_PRESSURE
-    return Task(protocol.name, protocol, *pressures, "regulator", load, starts)
+    return Task(schedule.name, schedule, *pressures, "regulator", load, starts)
 
 
 ISOTONIC: dict[str, Task] = {

@@ -1,4 +1,4 @@
-"""Tasks: a protocol, the actuator that moves, the pressures, and the scores."""
+"""Tasks: a schedule, the actuator that moves, the pressures, and the scores."""
 
 import math
 from dataclasses import dataclass
@@ -7,8 +7,10 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from pma_gym.data.protocol import DISPLACEMENT, ROTATION, Protocol
+from pma_gym.data.trial_schedule import DISPLACEMENT, ROTATION, TrialSchedule
 from pma_gym.metrics import PHASE_DURATION, PHASE_SAMPLES, SAMPLE_RATE_HZ, rmse
+from pma_gym.renamed_keywords import old_keywords
+from pma_gym.renamed_names import renamed_attribute
 
 if TYPE_CHECKING:
     from pma_gym.tasks.exercise import Exercise
@@ -20,13 +22,14 @@ Actuator = Literal["motor", "regulator"]
 """Which of the two voltages a task's controller gives; the other one is held."""
 
 
+@old_keywords({"protocol": "schedule"})
 @dataclass(frozen=True)
 class Task:
-    """A protocol to follow, who moves, and the pressures to do it at.
+    """A schedule to follow, who moves, and the pressures to do it at.
 
     Attributes:
         name: such as `displacement`.
-        protocol: phases and ideal reference.
+        schedule: phases and ideal reference.
         lowest_pressure: lower end of the pressures of the dissertation's trials (Pa).
         highest_pressure: upper end (Pa).
         actuator: whose voltage the action is. The regulator's contracts the muscle against `load`,
@@ -37,13 +40,14 @@ class Task:
     """
 
     name: str
-    protocol: Protocol
+    schedule: TrialSchedule
     lowest_pressure: float
     highest_pressure: float
     actuator: Actuator = "motor"
     load: float = 0.0
     start_pressures: tuple[float, float] | None = None
     exercise: "Exercise | None" = None
+    protocol = renamed_attribute("protocol", "schedule")
 
     def __post_init__(self) -> None:
         """Refuse what no environment can do."""
@@ -57,10 +61,10 @@ class Task:
         self._check_reference()
 
     def _check_mover(self) -> None:
-        if (self.actuator == "regulator") != (self.protocol.followed.shortens):
+        if (self.actuator == "regulator") != (self.schedule.followed.shortens):
             raise ValueError(
                 f"task {self.name}: the regulator contracts (quantity contraction) and the motor "
-                f"pulls (extension or rotation), got {self.protocol.quantity} by the "
+                f"pulls (extension or rotation), got {self.schedule.quantity} by the "
                 f"{self.actuator}"
             )
         if (self.actuator == "regulator") != (self.load > 0.0):
@@ -70,10 +74,10 @@ class Task:
             )
 
     def _check_reference(self) -> None:
-        every = np.concatenate([phase.reference(phase.times) for phase in self.protocol.phases])
+        every = np.concatenate([phase.reference(phase.times) for phase in self.schedule.phases])
         if not np.all(np.isfinite(every)):
             raise ValueError(f"task {self.name}: the reference must be finite throughout")
-        if abs(every[0]) > 1e-9 * self.protocol.span:
+        if abs(every[0]) > 1e-9 * self.schedule.span:
             raise ValueError(
                 f"task {self.name}: the reference must begin at 0, where a trial begins, got "
                 f"{every[0]:g} (m or rad); ramp it in"
@@ -82,7 +86,7 @@ class Task:
     @property
     def duration(self) -> float:
         """Duration of an episode (s), to the last scored sample."""
-        return self.protocol.duration + TRIAL_TAIL_S
+        return self.schedule.duration + TRIAL_TAIL_S
 
     @property
     def starts(self) -> tuple[float, float]:
@@ -99,7 +103,7 @@ class Task:
         words = self.name.replace("_", " ")
         if self.name in TASKS:
             return f"Isokinetic {words}"
-        contracts = self.protocol.followed.shortens
+        contracts = self.schedule.followed.shortens
         return words.capitalize() + (" contraction" if contracts else "")
 
     @property
@@ -108,13 +112,13 @@ class Task:
 
         Two tasks of one structure share their compiled code, however their references differ.
         """
-        protocol = self.protocol
+        schedule = self.schedule
         phases = [
             (p.start, p.duration, *((p.initial, p.slope) if p.motion is None else ("motion",)))
-            for p in protocol.phases
+            for p in schedule.phases
         ]
-        numbers = protocol.span, self.lowest_pressure, self.highest_pressure
-        said = (self.actuator, protocol.quantity, protocol.unit, *numbers, *phases)
+        numbers = schedule.span, self.lowest_pressure, self.highest_pressure
+        said = (self.actuator, schedule.quantity, schedule.unit, *numbers, *phases)
         if self.exercise:
             said += self.exercise.structure
         return tuple(map(repr, said))
@@ -130,7 +134,7 @@ class Task:
 
     def error_percent(self, error: Any) -> Any:  # noqa: ANN401
         """An error (m or rad) in percent of the task's range."""
-        return 100.0 * error / self.protocol.span
+        return 100.0 * error / self.schedule.span
 
     def ideals(self, samples: int) -> NDArray[np.float64]:
         """Ideal position (m or rad) at k / 384 s, shape (samples,), as a motion is scored.
@@ -139,9 +143,9 @@ class Task:
             samples: how many; beyond the last one that is scored the position stays.
         """
         time = np.arange(samples) / SAMPLE_RATE_HZ
-        last = self.protocol.phases[-1]
+        last = self.schedule.phases[-1]
         scored = (last.first + last.samples - 1) / SAMPLE_RATE_HZ
-        return self.protocol.phases[0].reference(np.minimum(time, scored))
+        return self.schedule.phases[0].reference(np.minimum(time, scored))
 
 
 TASKS: dict[str, Task] = {
@@ -151,34 +155,36 @@ TASKS: dict[str, Task] = {
 """The dissertation's two tasks; figures 31-36 show them. `EVERY_TASK` has the others too."""
 
 
+@old_keywords({"protocol": "schedule"})
 def phase_errors(
-    protocol: Protocol, position: NDArray[np.float64]
+    schedule: TrialSchedule, position: NDArray[np.float64]
 ) -> dict[str, NDArray[np.float64]]:
     """Error of a position on the 384 Hz grid, phase by phase, each on its own ideal line.
 
     Args:
-        protocol: the protocol.
+        schedule: phases and ideal reference.
         position: extension (m), rotation (rad) or contraction (m) at k / 384 s, shape (n,).
     Returns:
         Error (m or rad) by phase name: 1923 samples of 5 s, or as many as there are.
     """
     errors = {}
-    for phase in protocol.phases:
+    for phase in schedule.phases:
         actual = position[phase.first : phase.first + phase.samples]
         errors[phase.name] = actual - phase.reference(phase.times[: len(actual)])
     return errors
 
 
-def phase_rmse(protocol: Protocol, position: NDArray[np.float64]) -> dict[str, float]:
+@old_keywords({"protocol": "schedule"})
+def phase_rmse(schedule: TrialSchedule, position: NDArray[np.float64]) -> dict[str, float]:
     """RMSE of a position on the 384 Hz grid, of each phase begun and of them all together.
 
     Args:
-        protocol: the protocol.
+        schedule: phases and ideal reference.
         position: extension (m), rotation (rad) or contraction (m) at k / 384 s, shape (n,), n at
             least 1.
     Returns:
         RMSE (m or rad) by phase name, and `all`: over the samples of all phases.
     """
-    begun = {name: e for name, e in phase_errors(protocol, position).items() if len(e)}
+    begun = {name: e for name, e in phase_errors(schedule, position).items() if len(e)}
     known = {name: rmse(error) for name, error in begun.items()}
     return known | {"all": rmse(np.concatenate(list(begun.values())))}

@@ -14,7 +14,7 @@ import re
 from collections.abc import Callable
 
 from pma_gym.data import motions
-from pma_gym.data.protocol import Motion, Phase, Protocol
+from pma_gym.data.trial_schedule import Motion, Phase, TrialSchedule
 from pma_gym.tasks.task import TASKS, Task
 from pma_gym.units import SI_FACTORS
 
@@ -60,15 +60,15 @@ def following(
     Example:
         >>> import numpy as np
         >>> slow = following("slow", "extension", lambda t: 2e-3 * np.square(t), duration=3.0)
-        >>> slow.protocol.at(2.0), slow.steps(100.0)
+        >>> slow.schedule.at(2.0), slow.steps(100.0)
         (0.008, 301)
     """
     base = _base(quantity)
     mean = (float(motion(duration)) - float(motion(0.0))) / duration
     phase = Phase("whole", 0.0, duration, float(motion(0.0)), mean, motion)
-    own = base.protocol
-    protocol = Protocol(name, own.quantity, own.unit, span or own.span, (phase,))
-    return Task(name, protocol, base.lowest_pressure, base.highest_pressure)
+    own = base.schedule
+    schedule = TrialSchedule(name, own.quantity, own.unit, span or own.span, (phase,))
+    return Task(name, schedule, base.lowest_pressure, base.highest_pressure)
 
 
 def sine(
@@ -135,8 +135,8 @@ def _drawn(kind: str, quantity: str, seed: int, name: str, motion: Motion) -> Ta
 
 
 def _span(quantity: str) -> tuple[float, str]:
-    protocol = _base(quantity).protocol
-    return protocol.span, protocol.unit
+    schedule = _base(quantity).schedule
+    return schedule.span, schedule.unit
 
 
 def _base(quantity: str) -> Task:

@@ -21,7 +21,7 @@ def reports(tmp_path_factory, diagnoses, run):  # noqa: F811
     small, results = write_run(tmp_path)
     page = tmp_path / "diagnosis.html"
     page.write_text(report_page(diagnoses["effect"], "Rig 2", {"Seed": "3"}), encoding="utf-8")
-    board, _ = run_report(small, results, tmp_path / "board")
+    board, *_ = run_report(small, results, tmp_path / "board")
     return {"leaderboard": board, "diagnosis": page, "reproduction": run[1] / "report.html"}
 
 

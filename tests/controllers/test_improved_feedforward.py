@@ -19,7 +19,7 @@ TRIALS = [(task, p) for task in ("displacement", "rotation") for p in pressures(
 
 def voltages(station):
     controller = ImprovedFeedforward()
-    controller.reset(lambda time: float(station.task.protocol.reference(time)), station)
+    controller.reset(lambda time: float(station.task.schedule.reference(time)), station)
     steps = station.task.steps(1.0 / station.period)
     return np.array([controller.voltage(k * station.period) for k in range(steps)])
 
@@ -29,7 +29,7 @@ def inverted(station):
     inverse, steps = inverse_of(station.model), station.task.steps(1.0 / station.period)
     parts = inverse.parts(station.period)
     times = np.arange(steps * parts + 1) * station.period / parts
-    return inverse.along(station.task.protocol.reference(times), station)
+    return inverse.along(station.task.schedule.reference(times), station)
 
 
 def test_while_held_it_asks_for_the_voltage_that_settles_there():
@@ -95,7 +95,7 @@ def test_what_the_station_cannot_give_is_asked_for_at_the_limit(station, reading
     # The three-element model of 575 kPa needs over 10 V for 90 deg.
     where = station("rotation", 575, model="serres2008")
     controller = ImprovedFeedforward()
-    controller.reset(lambda time: float(where.task.protocol.reference(time)), where)
+    controller.reset(lambda time: float(where.task.schedule.reference(time)), where)
     assert controller.voltage(7.0) > 10.0
     assert controller.act(reading(), 7.0) == 10.0
 
@@ -104,7 +104,7 @@ def test_where_the_cable_would_have_to_push_it_asks_for_none(station, reading):
     # Hysteresis holds the muscle back at the end of phase III.
     where = station("rotation", 300)
     controller = ImprovedFeedforward()
-    controller.reset(lambda time: float(where.task.protocol.reference(time)), where)
+    controller.reset(lambda time: float(where.task.schedule.reference(time)), where)
     assert controller.voltage(14.95) < 0.0
     assert controller.act(reading(), 14.95) == 0.0
 
@@ -140,7 +140,7 @@ def test_the_regulator_gets_the_voltage_that_holds(station):
     model = load_model("serres2008").replace(FRICTIONLESS)
     where = StationInfo(model, EVERY_TASK["isotonic"], 300e3, 0.01)
     controller, plant = ImprovedFeedforward(), Plant(model)
-    controller.reset(where.task.protocol.at, where)
+    controller.reset(where.task.schedule.at, where)
     motor = (200.0 + 2.0) / 97.84
     rests = [
         plant.settle(motor, regulator_voltage=volts)

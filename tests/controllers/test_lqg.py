@@ -62,10 +62,10 @@ def test_linear_loop_has_the_poles_of_regulator_and_filter(
     """Separation: with the plant that it was designed for, delays add only poles at 0."""
     where = station_of(task, pressure, rate=rate)
     where = replace(where, action_delay=action, observation_delay=observation)
-    position = 0.5 * where.task.protocol.span
+    position = 0.5 * where.task.schedule.span
     controller = LQG(Settings(0.3, 0.05, 0.1))
     law = controller.linear(where, position)
-    motion = nominal_motion(where.task.protocol.at, where)
+    motion = nominal_motion(where.task.schedule.at, where)
     local, late = motion.local(position), round((action + observation) * rate)
     n = len(local.b)
     a, b, c = np.zeros((n + late, n + late)), np.zeros((n + late, 1)), np.zeros((1, n + late))

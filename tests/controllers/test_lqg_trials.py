@@ -49,7 +49,7 @@ def driven(controller, seed=3, task="displacement", **options):
         )
         ended = terminated or truncated
     position = env.trajectory()
-    return position - env.task.protocol.reference(np.arange(len(position)) / 384.0), env.voltages
+    return position - env.task.schedule.reference(np.arange(len(position)) / 384.0), env.voltages
 
 
 def test_integral_action_leaves_no_offset_where_another_station_is_held():

@@ -14,7 +14,7 @@ PRINTED = [(task, p) for task in ("displacement", "rotation") for p in pressures
 
 
 def task_reference(station):
-    return lambda time: float(station.task.protocol.reference(time))
+    return lambda time: float(station.task.schedule.reference(time))
 
 
 def printed(task, pressure_kpa):

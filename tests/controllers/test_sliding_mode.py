@@ -19,7 +19,7 @@ def begun(controller, station, task=None, delay=0.0):
     given = replace(station(pressure_kpa=300.0), action_delay=delay)
     if task is not None:
         given = replace(given, task=task)
-    controller.reset(given.task.protocol.at if task is None else lambda time: 0.0, given)
+    controller.reset(given.task.schedule.at if task is None else lambda time: 0.0, given)
     return given
 
 

@@ -7,20 +7,12 @@ import pytest
 
 from pma_gym.data.trial import Trial
 from pma_gym.data.trial_columns import BY_QUANTITY
-from pma_gym.discovery.diagnosis import (
-    Candidate,
-    Diagnosis,
-    Estimate,
-    Floor,
-    Gap,
-    Map,
-    Moved,
-    NamedEffect,
-    NextExperiment,
-    Place,
-    ResidualLaw,
-    TrialRecord,
-)
+from pma_gym.discovery.diagnosis import Diagnosis
+from pma_gym.discovery.result.candidate import Candidate
+from pma_gym.discovery.result.estimates import Estimate, Moved, NamedEffect
+from pma_gym.discovery.result.misfit import Gap, Map, Place, ResidualLaw, TrialRecord
+from pma_gym.discovery.result.next_experiment import NextExperiment
+from pma_gym.discovery.result.noise import Floor
 from pma_gym.plant.model import load_model
 from pma_gym.plant.plant import Plant
 from pma_gym.plant.rigs import RIGS

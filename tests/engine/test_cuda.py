@@ -42,7 +42,7 @@ class Pair:
         self.other.reset(7)
 
     def scores(self):
-        sums = [f"sum_{phase.name}" for phase in self.task.protocol.phases]
+        sums = [f"sum_{phase.name}" for phase in self.task.schedule.phases]
         return np.array([self.own.numbers(name) for name in ("sample", "ended", *sums)])
 
     def states(self):

@@ -69,9 +69,9 @@ def vandalise(station, reference):
     rotor = station.model.parameters["rotor"]
     changed = dict(station.model.parameters) | {"rotor": rotor._replace(radius=1.0)}
     object.__setattr__(station.model, "parameters", changed)
-    for protocol in (station.task.protocol, reference.protocol):
-        object.__setattr__(protocol, "span", 1.0)
-        for phase in protocol.phases:
+    for schedule in (station.task.schedule, reference.schedule):
+        object.__setattr__(schedule, "span", 1.0)
+        for phase in schedule.phases:
             object.__setattr__(phase, "slope", 0.0)
     object.__setattr__(station.task, "load", 1.0)
     object.__setattr__(station, "period", 1.0)
@@ -108,5 +108,5 @@ class Uncopied:
 
 def test_a_motion_that_cannot_be_copied_serves_as_it_is():
     env = made(following("mine", "extension", Uncopied(), 2.0))
-    assert env.reference(1.0) == env.station.task.protocol.at(1.0) == 2e-3
+    assert env.reference(1.0) == env.station.task.schedule.at(1.0) == 2e-3
     assert env.station.task is not env.task

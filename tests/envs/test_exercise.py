@@ -214,8 +214,8 @@ def test_scores_are_those_of_the_course(name):
     env = PMAEnv(name)
     env.reset(seed=5)
     infos = held(env)
-    last, unit = infos[-1], env.task.protocol.suffix
-    course = phase_rmse(env.task.protocol, env.trajectory())
+    last, unit = infos[-1], env.task.schedule.suffix
+    course = phase_rmse(env.task.schedule, env.trajectory())
     factor = math.pi / 180.0 if unit == "deg" else 1.0
     by_phase = {name: course[name] / factor for name in ("I", "II", "III")}
     assert last[f"rmse_by_phase_{unit}"] == pytest.approx(by_phase, rel=1e-9)
@@ -330,7 +330,7 @@ def test_the_observation_of_a_prescription_is_of_the_moment():
     volts = env.regulator_voltage
     for _ in range(300):
         observation, *_ = env.step(env.action(volts))
-    reading, station, span = env.measurement, env.station, env.task.protocol.span
+    reading, station, span = env.measurement, env.station, env.task.schedule.span
     plan = env.task.exercise.prescription
     assert observation[4] == pytest.approx(plan.at(reading.rotation) / span, rel=1e-6)
     assert observation[5] == pytest.approx(-station.position(reading) / span, rel=1e-5)

@@ -63,7 +63,7 @@ def test_contraction_comes_to_rest_where_the_forces_balance(pressure_kpa):
 
 def test_a_slow_triangle_of_pressure_contracts_as_the_forces_balance():
     """Section 4.1.5, at its slow limit: 450 to 550 kPa against 400 N in half a minute."""
-    slow = replace(ISOTONIC["triangle_high"], protocol=isotonic(part=10.0).protocol)
+    slow = replace(ISOTONIC["triangle_high"], schedule=isotonic(part=10.0).schedule)
     env = PMAEnv(slow, model=FRICTIONLESS, noise=False, control_rate_hz=20.0)
     env.reset(seed=0)
     start = static(FRICTIONLESS, 450.0, 400.0)
@@ -109,9 +109,9 @@ def test_contraction_is_positive_and_extension_negative_while_it_shortens(make):
     assert env.position == pytest.approx(-env.truth["extension"])
     # The LVDT lags by 1.6 ms, has 0.02 mm of noise and steps of 0.05 mm.
     assert position == pytest.approx(env.position, abs=0.2e-3)
-    past = [env.station.position(reading) / env.task.protocol.span for reading in delayed[-2:-4:-1]]
+    past = [env.station.position(reading) / env.task.schedule.span for reading in delayed[-2:-4:-1]]
     np.testing.assert_allclose(observation[[8, 9]], past, rtol=1e-6)
-    off = env.reference(env.time) / env.task.protocol.span - position / env.task.protocol.span
+    off = env.reference(env.time) / env.task.schedule.span - position / env.task.schedule.span
     assert observation[5] == pytest.approx(off, rel=1e-5)
 
 
@@ -124,23 +124,23 @@ def test_rmse_is_that_of_the_trajectory(name):
         volts = rest + 0.3e2 * env.reference(env.time)
         *_, terminated, truncated, info = env.step(env.action(volts))
         ended = terminated or truncated
-    errors = phase_rmse(env.task.protocol, env.trajectory())
+    errors = phase_rmse(env.task.schedule, env.trajectory())
     assert info["rmse_mm"] == pytest.approx(1e3 * errors.pop("all"), rel=1e-12)
     by_phase = {phase: pytest.approx(1e3 * value, rel=1e-12) for phase, value in errors.items()}
     assert info["rmse_by_phase_mm"] == by_phase and list(errors) == ["I", "II", "III"]
-    share = 100.0 * info["rmse_mm"] / (1e3 * env.task.protocol.span)
+    share = 100.0 * info["rmse_mm"] / (1e3 * env.task.schedule.span)
     assert info["percent_of_range"] == pytest.approx(share)
 
 
 def test_the_triangles_are_the_dissertations_trials():
     low, high = ISOTONIC["triangle_low"], ISOTONIC["triangle_high"]
     # Section 5.1.5: 1.94 mm are 17 % and 1.38 mm are 25 % of the total contraction.
-    assert 1e3 * low.protocol.span == pytest.approx(1.94 / 0.17, abs=0.05)
-    assert 1e3 * high.protocol.span == pytest.approx(1.38 / 0.25, abs=0.05)
-    assert (low.load, low.starts, low.protocol.duration) == (150.0, (150e3, 150e3), 12.0)
-    assert (high.load, high.starts, high.protocol.duration) == (400.0, (450e3, 450e3), 30.0)
+    assert 1e3 * low.schedule.span == pytest.approx(1.94 / 0.17, abs=0.05)
+    assert 1e3 * high.schedule.span == pytest.approx(1.38 / 0.25, abs=0.05)
+    assert (low.load, low.starts, low.schedule.duration) == (150.0, (150e3, 150e3), 12.0)
+    assert (high.load, high.starts, high.schedule.duration) == (400.0, (450e3, 450e3), 30.0)
     for task, period in ((low, 4.0), (high, 10.0)):
-        turns = task.protocol.reference(np.arange(7) * 0.5 * period) / task.protocol.span
+        turns = task.schedule.reference(np.arange(7) * 0.5 * period) / task.schedule.span
         np.testing.assert_allclose(turns, [0, 1, 0, 1, 0, 1, 0], atol=1e-12)
 
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pma_gym.data.protocol import Phase, Protocol
+from pma_gym.data.trial_schedule import Phase, TrialSchedule
 from pma_gym.engine.cpu import kernel
 from pma_gym.engine.cuda.cpu_device import CpuDevice
 from pma_gym.engine.cuda.device_engine import DeviceEngine
@@ -20,7 +20,7 @@ FACTORS = {"mm": 1e-3, "deg": np.pi / 180}
 
 def volts(env: PMAEnv) -> float:
     """A pull that follows roughly, whatever the task."""
-    return 1.0 + 3.0 * env.reference(env.time) / env.task.protocol.span
+    return 1.0 + 3.0 * env.reference(env.time) / env.task.schedule.span
 
 
 def run(env: PMAEnv, seed: int = 0) -> dict:
@@ -38,14 +38,14 @@ def run(env: PMAEnv, seed: int = 0) -> dict:
 def test_rmse_is_that_of_the_trajectory(make, name, rate):
     env = make(name, control_rate_hz=rate)
     info = run(env)
-    unit = env.task.protocol.unit
+    unit = env.task.schedule.unit
     time = np.arange(3843) / 384.0
     # Two samples lie beyond the 10 s: the motion goes on for them, it does not stop.
-    error = env.trajectory()[:3843] - env.task.protocol.motion(time)
+    error = env.trajectory()[:3843] - env.task.schedule.motion(time)
     expected = rmse(error) / FACTORS[unit]
     assert info[f"rmse_{unit}"] == pytest.approx(expected, rel=1e-12)
     assert info[f"rmse_by_phase_{unit}"] == {"whole": pytest.approx(expected, rel=1e-12)}
-    errors = phase_rmse(env.task.protocol, env.trajectory())
+    errors = phase_rmse(env.task.schedule, env.trajectory())
     assert errors["all"] / FACTORS[unit] == pytest.approx(expected, rel=1e-12)
 
 
@@ -65,11 +65,11 @@ def _ramp(time):
 
 
 def test_phases_of_one_motion_are_scored_apart(make):
-    bow = Protocol(
+    bow = TrialSchedule(
         "bow", "extension", "mm", 10e-3,
         tuple(Phase(n, s, 1.5, 0.0, 0.0, _bow) for n, s in (("out", 0.0), ("back", 1.5))),
     )  # fmt: skip
-    env = make(replace(TASKS["displacement"], name="bow", protocol=bow))
+    env = make(replace(TASKS["displacement"], name="bow", schedule=bow))
     info = run(env)
     error = env.trajectory()[:1155] - _bow(np.arange(1155) / 384.0)
     expected = {"out": rmse(error[:579]) * 1e3, "back": rmse(error[576:1155]) * 1e3}
@@ -116,7 +116,7 @@ def test_references_of_one_structure_share_their_code(make, monkeypatch):
     libraries.add(make("displacement_steps")._engine.kernel.library)
     assert len(libraries) == 1
     # A known name with other content has code of its own, and so has another range.
-    impostor = replace(TASKS["displacement"], protocol=UNSEEN["displacement_sine"].protocol)
+    impostor = replace(TASKS["displacement"], schedule=UNSEEN["displacement_sine"].schedule)
     assert make(impostor)._engine.kernel.library in libraries
     assert make("displacement")._engine.kernel.library not in libraries
     narrow = following("narrow", "extension", _ramp, span=10e-3)
@@ -131,12 +131,12 @@ def test_references_of_one_structure_share_their_code(make, monkeypatch):
 def test_what_the_agent_sees_is_what_is_scored(make, name):
     env = make(name, preview=1, noise=False)
     observation, _ = env.reset(seed=0)
-    protocol, span = env.task.protocol, env.task.protocol.span
+    schedule, span = env.task.schedule, env.task.schedule.span
     for _ in range(60):
-        now = [protocol.at(env.time), protocol.at(env.time + 0.01)]
+        now = [schedule.at(env.time), schedule.at(env.time + 0.01)]
         np.testing.assert_allclose(observation[[4, 6]], np.array(now) / span, atol=1e-6)
         assert env.reference(env.time) == now[0]
         observation, *_, info = env.step(env.action(1.0))
-        reference = info[f"reference_{protocol.unit}"] * FACTORS[protocol.unit]
-        assert reference == pytest.approx(protocol.at(env.time), abs=1e-12)
+        reference = info[f"reference_{schedule.unit}"] * FACTORS[schedule.unit]
+        assert reference == pytest.approx(schedule.at(env.time), abs=1e-12)
         assert env.error == pytest.approx(env.position - reference, abs=1e-12)

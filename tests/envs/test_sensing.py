@@ -15,7 +15,7 @@ from pma_gym.tasks import TASKS
 def test_entries_are_those_of_the_table(make, task, regulator):
     env = make(task, noise=False, preview=2, history=3, regulator_action=regulator)
     env.reset(seed=0)
-    at = TASKS[task].protocol.quantity
+    at = TASKS[task].schedule.quantity
     span = {"extension": 25e-3, "rotation": np.pi / 2}[at]
     delayed = [env.measurement]
     for k in range(30):

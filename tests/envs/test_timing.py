@@ -50,7 +50,7 @@ def test_episode_ends_with_its_last_sample(make, follow, task, rate, steps):
     info = follow(env, lambda time: 0.0)
     assert info["time_s"] == pytest.approx(steps / rate)
     assert len(env.motor_voltages) == steps
-    needed = round((len(env.task.protocol.phases) - 1) * 5 * 384) + PHASE_SAMPLES
+    needed = round((len(env.task.schedule.phases) - 1) * 5 * 384) + PHASE_SAMPLES
     position = env.trajectory()
     assert needed <= len(position) <= needed + 384 / rate
     assert np.all(np.isfinite(position))
@@ -82,7 +82,7 @@ def test_samples_are_the_same_at_every_control_rate(make, follow, ramp, task):
         env = make(task, control_rate_hz=rate, noise=False)
         # 384 Hz does not hit every step of the ramp: let it wait for the next of its instants.
         info = follow(env, lambda time: ramp(time + 1e-9))
-        scores.append(info[f"rmse_{env.task.protocol.unit}"])
+        scores.append(info[f"rmse_{env.task.schedule.unit}"])
         paths.append(env.trajectory()[:1921])
     np.testing.assert_allclose(scores, scores[0], rtol=1e-6)
     for path in paths[1:]:
@@ -102,7 +102,7 @@ def test_samples_at_the_ends_of_steps_are_the_states_there(make):
 def test_rmse_is_that_of_the_trajectory(make, follow, ramp, task):
     env = make(task)
     info = follow(env, ramp)
-    unit, factor = env.task.protocol.unit, {"mm": 1e-3, "deg": np.pi / 180}[env.task.protocol.unit]
+    unit, factor = env.task.schedule.unit, {"mm": 1e-3, "deg": np.pi / 180}[env.task.schedule.unit]
     ideals = {"mm": [lambda t: 5 * t]} | {
         "deg": [lambda t: 18 * t, lambda t: 90 + 0 * t, lambda t: 90 - 18 * t]
     }

@@ -8,8 +8,8 @@ from numpy.testing import assert_allclose
 from rich.console import Console
 
 from pma_gym.data.files.trial_files import read_trial, write_trial
-from pma_gym.data.protocol import DISPLACEMENT, ROTATION
 from pma_gym.data.trial import Trial, TrialError
+from pma_gym.data.trial_schedule import DISPLACEMENT, ROTATION
 from pma_gym.metrics import phase_times, rmse_from_regression
 from pma_gym.studies.evaluation import evaluate, print_evaluation
 

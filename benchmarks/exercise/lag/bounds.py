@@ -118,7 +118,7 @@ def foreknown_bounds(
     for seed in seeds:
         for pressure in pressures_kpa:
             exertion = Exertion(task, seed, model, pressure, operator)
-            paced = EVERY_TASK[task].protocol.followed.is_angle
+            paced = EVERY_TASK[task].schedule.followed.is_angle
             floor = own_floor(exertion) if paced else 0.0
             lags = [lag_of(model, factor) for factor in factors]
             for lag, free in courses_by_lag(exertion, lags).items():

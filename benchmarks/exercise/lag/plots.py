@@ -37,7 +37,7 @@ def _drawn(angle: float) -> bool:
 
 def _draw_least(axis: Axes, rows: Sequence[Causal]) -> None:
     """Least standard deviation against the lag, and the one at a constant voltage."""
-    unit = EVERY_TASK[rows[0].point.task].protocol.unit
+    unit = EVERY_TASK[rows[0].point.task].schedule.unit
     for point, color in zip(dict.fromkeys(row.point for row in rows), _COLORS, strict=False):
         name = f"{1e-3 * point.pressure:.0f} kPa"
         own = [row for row in rows if row.point == point]

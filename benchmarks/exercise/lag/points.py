@@ -59,7 +59,7 @@ class Point:
     @property
     def paced(self) -> bool:
         """Whether the exercise holds the speed."""
-        return EVERY_TASK[self.task].protocol.followed.is_angle
+        return EVERY_TASK[self.task].schedule.followed.is_angle
 
     @property
     def room(self) -> float:

@@ -123,8 +123,8 @@ class RepeatedExercise:
             control_rate_hz=RATE_HZ,
         )
         self.task = self._environments.task
-        protocol = self.task.protocol
-        self._suffix, self._phases = protocol.suffix, [phase.name for phase in protocol.phases]
+        schedule = self.task.schedule
+        self._suffix, self._phases = schedule.suffix, [phase.name for phase in schedule.phases]
 
     @cached_property
     def steps(self) -> int:
@@ -193,7 +193,7 @@ def own_floor(exertion: Exertion) -> float:
     while not ended:
         _, _, terminated, truncated, _ = environment.step(environment.action(0.0))
         ended = terminated or truncated
-    phase = environment.task.protocol.phases[0]
+    phase = environment.task.schedule.phases[0]
     angle = environment.trajectory()[: phase.samples]
     line = phase.initial + phase.slope * np.arange(len(angle)) / SAMPLE_RATE_HZ
     ahead = angle > line

@@ -102,4 +102,4 @@ def _place(point: Point) -> str:
 
 
 def _unit(task: str) -> str:
-    return EVERY_TASK[task].protocol.unit
+    return EVERY_TASK[task].schedule.unit

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pma_gym.data.datasets.dataset import Dataset
-from pma_gym.discovery.answer import MOVED
+from pma_gym.discovery.answer.own_parameters import MOVED
 from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
 from pma_gym.discovery.fitting.fit_problem import FitProblem, Fitted
 from pma_gym.discovery.fitting.free_parameters import free_parameters, unit, values

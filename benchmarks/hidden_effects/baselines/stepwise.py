@@ -23,8 +23,10 @@ from pma_gym.data.datasets.dataset import Dataset
 from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
 from pma_gym.discovery.fitting.fit_problem import FitProblem, Fitted
 from pma_gym.discovery.fitting.free_parameters import values
+from pma_gym.discovery.screening.probe_scores import Baseline
 from pma_gym.discovery.screening.residuals import simulated_less_measured
-from pma_gym.discovery.screening.score_test import Baseline, screen, starting_points
+from pma_gym.discovery.screening.score_test import screen
+from pma_gym.discovery.screening.starting_points import starting_points
 from pma_gym.discovery.selection.forward_selection import MOST_EFFECTS, NEAR, TRIED
 
 Array = NDArray[np.float64]

@@ -16,6 +16,7 @@ from benchmarks.hidden_effects.evaluation.verdicts import compare, judged
 from benchmarks.hidden_effects.generation.cases import Case, measure
 from benchmarks.hidden_effects.generation.experiment_library import Volts, random_experiment
 from benchmarks.hidden_effects.physics.simulation import RATE
+from pma_gym.discovery.result.next_experiment import proposed_excitation
 
 CHOOSERS = ("proposed", "random")
 """Who chooses the experiment. The random one's length is that of the first proposal."""
@@ -54,7 +55,7 @@ def _chosen(chooser: str, case: Case, answer: Answer, rounds: int, judge: Judge)
         if chooser == "random":
             words, volts = random_experiment(g, rows)
         elif answer.document is not None:
-            words = answer.document["next_experiment"]["protocol"]
+            words = proposed_excitation(answer.document["next_experiment"])
         case = with_trial(case, volts, g)
         begun = time.perf_counter()
         answer = asked(case, case.truth["number"], judge)
@@ -81,4 +82,4 @@ def _round(case: Case, answer: Answer, words: str) -> Round:
     if answer.document is not None:
         said = compare(case.truth, answer.document).said
     hidden = [effect["name"] for effect in case.truth["effects"]]
-    return {"protocol": words, "said": said, **judged(said, hidden)}
+    return {"excitation": words, "said": said, **judged(said, hidden)}

@@ -1,4 +1,4 @@
-"""Drawing a case: protocols, a rig that differs from what the lab believes, an effect, noise."""
+"""Drawing a case: excitations, a rig that differs from what the lab believes, an effect, noise."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -16,7 +16,7 @@ from benchmarks.hidden_effects.generation.effect_size import (
     simulate_variants,
 )
 from benchmarks.hidden_effects.generation.effects import ALL, KINDS, OUTSIDE, Values
-from benchmarks.hidden_effects.generation.excitation import PROTOCOLS, draw_trial
+from benchmarks.hidden_effects.generation.excitation import EXCITATIONS, draw_trial
 from benchmarks.hidden_effects.generation.likelihood_ratios import odds_of_parameters
 from benchmarks.hidden_effects.generation.readout_noise import NONE, ReadoutNoise, draw_noise
 from benchmarks.hidden_effects.physics import rig as rigs
@@ -51,7 +51,7 @@ NEED_PRESSURE = {
     "hose_resonance",
 }
 NEED_EARLY = {"warm_up"}
-"""Effects that would hide from some draws of protocols, and so get some of their own."""
+"""Effects that would hide from some draws of excitations, and so get some of their own."""
 
 WEAK = 0.3
 """Ratio below which a hidden effect counts as not excited."""
@@ -182,7 +182,7 @@ def draw_rig(g: np.random.Generator, most: float) -> tuple[dict[str, float], dic
     some = set(g.choice(len(SCALED_TOGETHER), g.integers(1, 4), replace=False).tolist())
     for i, together in enumerate(SCALED_TOGETHER):
         if most > 0.1:
-            # Drive, radius and stiffness by a quarter would break what the protocols promise.
+            # Drive, radius and stiffness by a quarter would break what the excitations promise.
             reach = 0.15 if together[0] in ("force_slope", "stiffness_low", "drive_gain") else most
             off = g.choice([-1.0, 1.0]) * g.uniform(0.1, reach) if i in some else 0.0
         else:
@@ -204,11 +204,11 @@ def _draw_effects(g: np.random.Generator, block: str) -> tuple[str, ...]:
 def _draw_trials(
     g: np.random.Generator, rig: Values, hidden: set[str], trials: int, seconds: float
 ) -> tuple[list[str], Commands, dict[int, int]]:
-    """Names of protocols, commands, and which trial repeats which."""
+    """Names of excitations, commands, and which trial repeats which."""
     loose = set(g.choice(trials - 1, max(1, trials // 3), replace=False).tolist())
     loose |= {0, 1} if hidden & NEED_LOOSE else set()
-    # Protocols differ as far as there are enough; five of them always move load and pressure.
-    names = [str(n) for n in g.permutation(list(PROTOCOLS)).tolist()]
+    # Excitations differ as far as there are enough; five of them always move load and pressure.
+    names = [str(n) for n in g.permutation(list(EXCITATIONS)).tolist()]
     if hidden & NEED_PRESSURE:
         names.sort(key=lambda name: name != "pressure_steps")
     if hidden & NEED_EARLY:

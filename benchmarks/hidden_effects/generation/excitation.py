@@ -30,17 +30,17 @@ def loads_at(pressure: float, deepest: float = DEEPEST) -> tuple[float, float]:
 def draw_trial(
     generator: Generator, name: str, seconds: float, loose: bool, deep: bool
 ) -> tuple[Array, Array]:
-    """A protocol's motor and regulator voltages, shape (rows,) each.
+    """An excitation's motor and regulator voltages, shape (rows,) each.
 
     Args:
         generator: source of chance.
-        name: of the protocol.
+        name: of the excitation.
         seconds: how long.
         loose: begin without any load.
         deep: go beyond the resting length.
     """
     g, time = generator, np.arange(round(seconds * RATE)) / RATE
-    pressure, load = PROTOCOLS[name](g, time, -7e-3 if deep else DEEPEST)
+    pressure, load = EXCITATIONS[name](g, time, -7e-3 if deep else DEEPEST)
     if deep and np.ptp(load) > 0.0:
         load = np.maximum(load + loads_at(float(pressure.min()), -7e-3)[1] - load.max(), 70.0)
     if loose:
@@ -155,7 +155,7 @@ def _common(g: Generator, low: float, high: float) -> float:
     return float(g.uniform(least, max(most, least + 20.0)))
 
 
-PROTOCOLS: dict[str, Callable[[Generator, Array, float], tuple[Array, Array]]] = {
+EXCITATIONS: dict[str, Callable[[Generator, Array, float], tuple[Array, Array]]] = {
     "triangles": _triangles,
     "load_steps": _load_steps,
     "pressure_steps": _pressure_steps,

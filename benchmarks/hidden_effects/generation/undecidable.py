@@ -4,7 +4,7 @@ Both are fixed beforehand with the generator's own ruler, to first order about t
 hidden effect is set against the best that the base parameters, within what is known of them, could
 do without it, and against every rival of another group, of free size. A case is untellable where
 one of these is behind the truth by a log-likelihood of at most `UNTOLD`; it is tellable where a
-protocol of the package's library gives the hidden effect a ratio r of at least `SHOWN`.
+excitation of the package's library gives the hidden effect a ratio r of at least `SHOWN`.
 """
 
 from collections.abc import Mapping
@@ -72,7 +72,7 @@ WITNESS: dict[str, str] = {
     "torque_ripple": _SINES,
     "current_imbalance": _SINES,
 }
-"""Effects of the block, and how the protocol of the library begins that would show each."""
+"""Effects of the block, and how the excitation of the library begins that would show each."""
 
 
 @dataclass(frozen=True)

@@ -57,12 +57,12 @@ def judged(
         stations = Stations("robust", FIRST, STATIONS)
         options = {"randomisation": stations, "model": stations.structure}
     env, errors = PMAEnv(task, **options), []
-    key = f"rmse_by_phase_{env.task.protocol.suffix}"
+    key = f"rmse_by_phase_{env.task.schedule.suffix}"
     for seed in range(SEED, SEED + count):
         info = _driven(env, controller, seed)
         if info is not None:
             errors.append(list(info[key].values()))
-    phases = len(env.task.protocol.phases)
+    phases = len(env.task.schedule.phases)
     return Judged(np.array(errors).reshape(-1, phases), count - len(errors))
 
 
@@ -100,8 +100,8 @@ def figures_of(names: Sequence[str], count: int, task: str) -> dict[str, Any]:
             means = one.errors.mean(axis=0).round(4).tolist()
             row = {"controller": controller.name, "stations": stations, "rmse": means}
             rows.append(row | {"ended": one.ended})
-    phases = [phase.name for phase in known.protocol.phases]
-    return {"count": count, "unit": known.protocol.unit, "phases": phases, "rows": rows}
+    phases = [phase.name for phase in known.schedule.phases]
+    return {"count": count, "unit": known.schedule.unit, "phases": phases, "rows": rows}
 
 
 def table_of(figures: Mapping[str, Any]) -> list[str]:

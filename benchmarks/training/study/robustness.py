@@ -129,10 +129,10 @@ def _error(
 ) -> float:
     environment = PMAEnv(task, model=model, pressure_kpa=pressure_kpa, **options)
     done = rollout(environment, controller, seed, nominal)
-    phases: Sequence[Any] = environment.task.protocol.phases
+    phases: Sequence[Any] = environment.task.schedule.phases
     row: dict[str, Any] = {"task": task, "failure": done.ended_by, "phases": {}}
     if not done.ended_by:
-        unit = SI_FACTORS[environment.task.protocol.unit]
-        by_phase = phase_rmse(environment.task.protocol, done.position)
+        unit = SI_FACTORS[environment.task.schedule.unit]
+        by_phase = phase_rmse(environment.task.schedule, done.position)
         row["phases"] = {p.name: {"rmse": by_phase[p.name] / unit} for p in phases}
     return measure_of(task).of_row(row)

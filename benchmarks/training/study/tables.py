@@ -99,5 +99,5 @@ def robustness_table(figures: Mapping[str, Any], task: str) -> TextTable:
         [condition, *(f"{errors[name]:.3g}" for name in names)]
         for condition, errors in conditions.items()
     ]
-    unit = EVERY_TASK[task].protocol.unit
+    unit = EVERY_TASK[task].schedule.unit
     return TextTable(f"{task} ({unit})", ["Condition", *names], rows)

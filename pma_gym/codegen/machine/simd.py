@@ -43,7 +43,7 @@ _INTRINSICS = {"square_root": "sqrt", "absolute": "fabs", "floor": "floor"}
 
 
 class SimdEmitter:
-    """Writes traced arithmetic for a number of lanes.
+    """Write traced arithmetic for a number of lanes.
 
     Args:
         width: lanes of a vector; 1 writes scalar code.
@@ -91,7 +91,7 @@ class SimdEmitter:
         outputs: Sequence[Value],
         known: Mapping[int, Operand],
     ) -> dict[int, Operand]:
-        """Write the arithmetic of the outputs where the builder stands.
+        """Write the arithmetic of the outputs at the builder's position.
 
         Args:
             builder: where to write.

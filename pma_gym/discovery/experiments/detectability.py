@@ -5,12 +5,12 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from pma_gym.discovery.diagnosis import NextExperiment
 from pma_gym.discovery.experiments.excitation import Excitation, library
 from pma_gym.discovery.experiments.predicted_trials import Columns, columns, derivatives, proposal
 from pma_gym.discovery.fitting.candidate_effect import CandidateEffect, bounds
 from pma_gym.discovery.fitting.fit_problem import FitProblem, Fitted
 from pma_gym.discovery.fitting.predictive_density import unabsorbed
+from pma_gym.discovery.result.next_experiment import NextExperiment
 from pma_gym.discovery.screening.score_test import SHOWN_GAIN, ScreeningScore
 from pma_gym.effects import CATALOGUE
 
@@ -27,10 +27,10 @@ def experiment_to_detect(
     scores: Sequence[ScreeningScore],
     seed: int = 0,
 ) -> NextExperiment | None:
-    """The protocol in which most would show of what these trials cannot show.
+    """The excitation in which most would show of what these trials cannot show.
 
     How large an effect is if it is there nobody knows: any size from a tenth of the usual one to
-    that counts as equally likely, in proportion. The best protocol makes the most effects show that
+    that counts as equally likely, in proportion. The best one makes the most effects show that
     would not have shown by now, on average; among equals the shortest.
 
     Args:
@@ -38,10 +38,10 @@ def experiment_to_detect(
         fit: the refitted model, without any candidate that is looked for.
         candidates: those that would be worth seeing.
         scores: at them in the trials so far, which say from what size on they would have been seen.
-        seed: of what is random in protocols.
+        seed: of what is random in excitations.
     Returns:
         What to measure next; None where every effect would have been seen at its usual size, or no
-        protocol would show one that would not.
+        excitation would show one that would not.
     """
     known = {each.candidate.name: each for each in scores}
     wanted = [candidate for candidate in candidates if candidate.name in known]
@@ -92,7 +92,7 @@ def _shown(
     excitations: Sequence[Excitation],
     hidden: Sequence[tuple[CandidateEffect, Array]],
 ) -> Array:
-    """Chi-square that hidden candidates of usual size would gain in protocols, shape (n, k)."""
+    """Chi-square that hidden candidates of usual size would gain in excitations, shape (n, k)."""
     trials = [excitation.simulated[0] for excitation in excitations]
     grown = list[list[Columns | None]]()
     for candidate, usual in hidden:

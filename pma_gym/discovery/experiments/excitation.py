@@ -1,6 +1,6 @@
 """Experiments that a rig survives: what a lab can run next, as commands.
 
-A protocol is a shape: of the load at constant pressure, of the pressure at constant load, or of
+An excitation is a shape: of the load at constant pressure, of the pressure at constant load, or of
 both, in turn or at once. Its size is the largest at which tension, contraction, stretch and
 pressure stay within the model's limits with margin, in every model that may be true.
 """
@@ -25,10 +25,10 @@ RATE_HZ = 128.0
 """Commands a second; what a lab's DAQ can do, and fine enough that a step is a step."""
 
 MARGIN = 0.9
-"""Share of each limit that a protocol may use."""
+"""Share of each limit that an excitation may use."""
 
 SIZES = (1.0, 0.85, 0.7, 0.55, 0.4)
-"""Shares of the full range that are tried until a protocol is safe."""
+"""Shares of the full range that are tried until an excitation is safe."""
 
 LEAST_LOAD_N = 25.0
 """Least load (N): the cable stays taut."""
@@ -37,10 +37,10 @@ MOST_VOLTS = 9.5
 """Most volts of a command, of the 10 that there are."""
 
 PRESSURES = (0.12, 0.5, 0.88)
-"""Constant pressures of protocols that change the load, as shares of the range of pressures."""
+"""Constant pressures of excitations that change the load, as shares of the range of pressures."""
 
 LOADS = (0.15, 0.4, 0.7)
-"""Constant loads of protocols that change the pressure, as shares of the range of loads."""
+"""Constant loads of excitations that change the pressure, as shares of the range of loads."""
 
 LOW = 0.12
 """Share of the range of loads that a sudden step begins from: from less the cable would go slack
@@ -106,11 +106,11 @@ class Range:
 
 
 Recipe = Callable[[float], tuple[str, Trial]]
-"""Name and commands of a protocol of some size, a share of the full range."""
+"""Name and commands of an excitation of some size, a share of the full range."""
 
 
 def library(models: Sequence[Model], seed: int = 0) -> Iterator[Excitation]:
-    """All protocols that are safe, one after the other.
+    """All excitations that are safe, one after the other.
 
     None for what is no station: only a station comes to rest by itself.
 
@@ -130,7 +130,7 @@ def library(models: Sequence[Model], seed: int = 0) -> Iterator[Excitation]:
 
 
 def _largest(plants: Sequence[Plant], recipe: Recipe) -> Excitation | None:
-    """A protocol as large as is safe in every model; None if it never is."""
+    """An excitation as large as is safe in every model; None if it never is."""
     for size in SIZES:
         name, trial = recipe(size)
         try:
@@ -248,7 +248,7 @@ def _both_shapes(seed: int) -> Iterator[tuple[str, Array, Array]]:
     """Shapes of both: words, shares of the range of loads, shares of that of pressures.
 
     Who does not know what is missing wants one experiment that hides little: each change of load
-    and of pressure that the other protocols have, in one trial.
+    and of pressure that the other excitations have, in one trial.
     """
     slow = _interpolated([(0, 0.05), (1, 0.05), (5, 0.95), (9, 0.05)])
     fast = _interpolated([(0, LOW), *[(1 + k, LOW + 0.7 * (k % 2)) for k in range(9)]])

@@ -1,9 +1,9 @@
 """The experiment that would tell more: of a library of safe ones, what separates rivals fastest.
 
-Every rival simulates each protocol with the parameters that it was fitted with. How far two of them
-lie apart, whitened by the noise, is what the data of such a trial could tell; what the parameters
-of the wrong one could still absorb, given how well the trials so far determine them, is taken out
-to first order. Half of the chi-square that is left is the log-likelihood ratio to expect.
+Every rival simulates each excitation with its fitted parameters. How far two of them lie apart,
+whitened by the noise, is what the data of such a trial could tell; what the parameters of the wrong
+one could still absorb, given how well the trials so far determine them, is taken out to first
+order. Half of the chi-square that is left is the log-likelihood ratio to expect.
 """
 
 from collections.abc import Iterator, Sequence
@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pma_gym.data.trial import Trial
-from pma_gym.discovery.diagnosis import NextExperiment
 from pma_gym.discovery.experiments.excitation import Excitation, library
 from pma_gym.discovery.experiments.predicted_trials import (
     as_measured,
@@ -25,6 +24,7 @@ from pma_gym.discovery.experiments.predicted_trials import (
 from pma_gym.discovery.fitting.candidate_effect import CandidateEffect, bounds
 from pma_gym.discovery.fitting.fit_problem import FitProblem, Fitted
 from pma_gym.discovery.fitting.predictive_density import covariance_root, unabsorbed
+from pma_gym.discovery.result.next_experiment import NextExperiment
 from pma_gym.discovery.screening.score_test import SHOWN_GAIN
 from pma_gym.plant.model import Model
 
@@ -36,7 +36,7 @@ ENOUGH = SHOWN_GAIN / 2.0
 open is not preferred to one that settles it."""
 
 LEAST = 1.0
-"""Log odds below which no protocol tells two rivals apart at all."""
+"""Log odds below which no excitation tells two rivals apart at all."""
 
 DRAWS = 8
 """Sizes and shapes of effects that the promise is tried on, beside the estimate."""
@@ -47,10 +47,10 @@ PLAUSIBLE = (0.1, 2.0)
 
 @dataclass(frozen=True)
 class ExpectedOdds:
-    """What to expect of a protocol.
+    """What to expect of an excitation.
 
     Attributes:
-        excitation: the protocol.
+        excitation: its name and commands.
         log_odds: of the pair of rivals that is hardest to tell.
         pair: that pair, (true, wrong); (0, 1) where it does not matter.
     """
@@ -106,7 +106,7 @@ class Discrimination:
         pairs: Sequence[tuple[int, int]],
         refitted: bool = True,
     ) -> Array:
-        """Log odds to expect of protocols for each pair, shape (protocols, pairs).
+        """Log odds to expect of excitations for each pair, shape (excitations, pairs).
 
         The lower quartile over what the true rival may be: a promise that is mostly kept.
 
@@ -165,15 +165,15 @@ def _simulated(excitations: Sequence[Excitation], rival: int) -> list[Trial]:
 def next_experiment(
     problem: FitProblem, rivals: Sequence[Rival], seed: int
 ) -> NextExperiment | None:
-    """The safe protocol that tells rivals apart fastest.
+    """The safe excitation that tells rivals apart fastest.
 
     Args:
         problem: the trials so far.
         rivals: models that explain them, each fitted, with the candidates in it.
-        seed: of what is random in protocols, and of what the rivals may be.
+        seed: of what is random in excitations, and of what the rivals may be.
     Returns:
         What to measure next; None where there are not two rivals, see `experiment_to_detect` then,
-        or where no protocol is safe.
+        or where no excitation is safe.
     """
     if len(rivals) < 2:
         return None
@@ -193,10 +193,10 @@ def next_experiment(
 def fastest(
     discrimination: Discrimination, excitations: Sequence[Excitation]
 ) -> ExpectedOdds | None:
-    """The best of protocols, None if there are none.
+    """The best of excitations, None if there are none.
 
     What parameters absorb only lowers the odds. So differences as they are bound them from above,
-    and the costly derivatives are needed for few protocols.
+    and the costly derivatives are needed for few excitations.
     """
     if not excitations:
         return None

@@ -1,4 +1,4 @@
-"""What trials that nobody measured yet would tell: those of protocols, simulated by a model."""
+"""What trials that nobody measured yet would tell: those of excitations, simulated by a model."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pma_gym.data.trial import Trial
-from pma_gym.discovery.diagnosis import NextExperiment
 from pma_gym.discovery.experiments.excitation import Excitation
 from pma_gym.discovery.fitting.fit_problem import FitProblem, Fitted
 from pma_gym.discovery.preparation.whitened_residuals import WhitenedResiduals
+from pma_gym.discovery.result.next_experiment import NextExperiment
 from pma_gym.plant.model import Model
 
 Array = NDArray[np.float64]
@@ -88,10 +88,10 @@ def _measured(trial: Trial) -> Iterator[str]:
 
 
 def proposal(excitation: Excitation, separates: Sequence[str], log_odds: float) -> NextExperiment:
-    """A protocol as an experiment to propose.
+    """An excitation as an experiment to propose.
 
     Args:
-        excitation: the protocol.
+        excitation: its name and commands.
         separates: names of what it tells apart.
         log_odds: natural logarithm of the odds to expect; no more than `MOST` is promised.
     """

@@ -16,10 +16,10 @@ from pma_gym.data.datasets.dataset import NamedTrial
 from pma_gym.data.signals import SIGNALS, Signal
 from pma_gym.data.trial import MEASUREMENTS, Trial
 from pma_gym.data.trial_columns import BY_NAME, BY_QUANTITY, TrialError
-from pma_gym.discovery.diagnosis import TrialState
 from pma_gym.discovery.fitting.candidate_effect import CandidateEffect, bounds
 from pma_gym.discovery.fitting.fit_problem import FitProblem, Fitted
 from pma_gym.discovery.fitting.free_parameters import unit
+from pma_gym.discovery.result.estimates import TrialState
 from pma_gym.documents import read_toml
 from pma_gym.estimation.initial_states import starts
 from pma_gym.estimation.logged import Logged

@@ -3,8 +3,8 @@
 from collections.abc import Sequence
 
 from pma_gym.data.trial_columns import BY_QUANTITY
-from pma_gym.discovery.diagnosis import Estimate, NamedEffect
 from pma_gym.discovery.preparation.initial_floors import Level
+from pma_gym.discovery.result.estimates import Estimate, NamedEffect
 from pma_gym.units import SI_FACTORS
 
 COARSER = 1.5

@@ -1,8 +1,9 @@
 """What is left of the signals in sentences: how many floors, and which log would decide."""
 
-from pma_gym.discovery.diagnosis import Diagnosis, Judgement
+from pma_gym.discovery.diagnosis import Diagnosis
 from pma_gym.discovery.preparation.acceptance_floors import ENOUGH, ERRORS, REPEATS, REST, TOLERANCE
-from pma_gym.discovery.report.text import figure, listed, signal_name, signal_unit
+from pma_gym.discovery.report.figure_text import figure, listed, signal_name, signal_unit
+from pma_gym.discovery.result.noise import Judgement
 from pma_gym.discovery.verdict.adequacy import LEAST_BLOCKS, MOST_EXPLAINED, MOST_FLOORS, OPEN
 
 FLOORS = {

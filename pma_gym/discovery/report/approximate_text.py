@@ -1,7 +1,8 @@
 """Effects whose law is approximate in sentences: what they close, what they leave, and why."""
 
-from pma_gym.discovery.diagnosis import Approximate
-from pma_gym.discovery.report.text import effect_name, effect_names, figure, percent
+from pma_gym.discovery.report.effect_text import effect_name, effect_names
+from pma_gym.discovery.report.figure_text import figure, percent
+from pma_gym.discovery.result.estimates import Approximate
 from pma_gym.discovery.verdict.residual_laws import LAWS
 from pma_gym.discovery.verdict.unknown import Reason
 

@@ -8,9 +8,10 @@ from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
 from pma_gym.data.trial_columns import BY_NAME
-from pma_gym.discovery.diagnosis import Diagnosis, TrialRecord
+from pma_gym.discovery.diagnosis import Diagnosis
+from pma_gym.discovery.report.figure_text import signal_name, signal_unit
 from pma_gym.discovery.report.pictures import AFTER, BEFORE, MEASURED, after_name
-from pma_gym.discovery.report.text import signal_name, signal_unit
+from pma_gym.discovery.result.misfit import TrialRecord
 from pma_gym.pages.figures import legend_below, picture, png
 from pma_gym.pages.interactive import InteractiveFigure, Trace
 from pma_gym.units import SI_FACTORS

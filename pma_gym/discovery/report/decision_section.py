@@ -3,13 +3,13 @@
 from collections.abc import Mapping
 
 from pma_gym.discovery.diagnosis import Diagnosis
+from pma_gym.discovery.report.effect_text import effect_names, readable
 from pma_gym.discovery.report.tables import (
     candidates_table,
     floors_table,
     moved_table,
     unknown_table,
 )
-from pma_gym.discovery.report.text import effect_names, readable
 from pma_gym.pages.document import Block, Heading, Paragraph, Steps, TextTable
 
 _CANDIDATES = (

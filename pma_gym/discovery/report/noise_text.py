@@ -4,10 +4,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from pma_gym.discovery.diagnosis import Nuisance
 from pma_gym.discovery.preparation.learnt_noise import UNSURE
 from pma_gym.discovery.preparation.mains_lines import line_size
-from pma_gym.discovery.report.text import figure, listed, signal_name
+from pma_gym.discovery.report.figure_text import figure, listed, signal_name
+from pma_gym.discovery.result.noise import Nuisance
 from pma_gym.discovery.screening.residuals import simulated_less_measured
 from pma_gym.discovery.screening.scan_statistic import autocorrelation
 from pma_gym.discovery.verdict.findings import Findings

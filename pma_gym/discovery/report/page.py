@@ -2,10 +2,20 @@
 
 from collections.abc import Mapping
 
-from pma_gym.discovery.diagnosis import Diagnosis, NamedEffect
+from pma_gym.discovery.diagnosis import Diagnosis
 from pma_gym.discovery.report.adequacy_text import floors_left
 from pma_gym.discovery.report.curves import curves_figure, curves_picture, worst_trial
 from pma_gym.discovery.report.decision_section import decision_blocks
+from pma_gym.discovery.report.effect_text import (
+    effect_equation,
+    effect_name,
+    effect_names,
+    effect_summary,
+    effect_symbols,
+    readable,
+)
+from pma_gym.discovery.report.figure_text import capitalised, chance, duration, odds
+from pma_gym.discovery.report.next_steps import what_to_do
 from pma_gym.discovery.report.pictures import (
     after_name,
     commands_picture,
@@ -22,20 +32,8 @@ from pma_gym.discovery.report.tables import (
     moved_table,
     places_table,
 )
-from pma_gym.discovery.report.text import (
-    VERDICTS,
-    capitalised,
-    chance,
-    duration,
-    effect_equation,
-    effect_name,
-    effect_names,
-    effect_summary,
-    effect_symbols,
-    odds,
-    readable,
-    what_to_do,
-)
+from pma_gym.discovery.report.verdict_text import VERDICTS
+from pma_gym.discovery.result.estimates import NamedEffect
 from pma_gym.effects import CATALOGUE
 from pma_gym.pages.document import (
     Block,

@@ -9,8 +9,9 @@ from matplotlib.ticker import MaxNLocator, NullLocator
 
 from pma_gym.data.trial import Trial
 from pma_gym.data.trial_columns import COLUMNS
-from pma_gym.discovery.diagnosis import Diagnosis, Gap, Map, ResidualLaw
-from pma_gym.discovery.report.text import figure, signal_name, signal_unit
+from pma_gym.discovery.diagnosis import Diagnosis
+from pma_gym.discovery.report.figure_text import figure, signal_name, signal_unit
+from pma_gym.discovery.result.misfit import Gap, Map, ResidualLaw
 from pma_gym.pages.figures import legend_below, picture, png
 
 # Okabe and Ito's palette; markers and dashes tell apart what a weak printer does not.

@@ -2,14 +2,9 @@
 
 from collections.abc import Sequence
 
-from pma_gym.discovery.diagnosis import NamedEffect
-from pma_gym.discovery.report.text import (
-    at_its_limit,
-    effect_name,
-    effect_names,
-    figure,
-    undetermined_text,
-)
+from pma_gym.discovery.report.effect_text import effect_name, effect_names
+from pma_gym.discovery.report.figure_text import at_its_limit, figure, undetermined_text
+from pma_gym.discovery.result.estimates import NamedEffect
 from pma_gym.units import suffix, with_unit
 
 

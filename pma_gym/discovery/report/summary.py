@@ -6,26 +6,25 @@ from collections.abc import Iterator
 
 from rich.table import Table
 
-from pma_gym.discovery.diagnosis import Diagnosis, Gap
+from pma_gym.discovery.diagnosis import Diagnosis
 from pma_gym.discovery.report.adequacy_text import floors_left
-from pma_gym.discovery.report.text import (
-    VERDICTS,
+from pma_gym.discovery.report.effect_text import effect_name, effect_names, readable
+from pma_gym.discovery.report.figure_text import (
     chance,
-    effect_name,
-    effect_names,
     estimate,
     estimate_text,
     figure,
     gap_closed,
     interval,
     percent,
-    readable,
     signal_name,
     signal_unit,
     undetermined_text,
     unit_cell,
-    what_to_do,
 )
+from pma_gym.discovery.report.next_steps import what_to_do
+from pma_gym.discovery.report.verdict_text import VERDICTS
+from pma_gym.discovery.result.misfit import Gap
 from pma_gym.terminal import table_console
 
 _MOST_PLACES, _MOST_PARAMETERS = 3, 5

@@ -2,31 +2,24 @@
 
 from collections.abc import Mapping
 
-from pma_gym.discovery.diagnosis import (
-    Diagnosis,
-    Floor,
-    Gap,
-    Judgement,
-    Moved,
-    NamedEffect,
-    Place,
-)
+from pma_gym.discovery.diagnosis import Diagnosis
 from pma_gym.discovery.report.adequacy_text import FLOORS
-from pma_gym.discovery.report.text import (
+from pma_gym.discovery.report.effect_text import effect_name, effect_names, readable
+from pma_gym.discovery.report.figure_text import (
     chance,
-    effect_name,
-    effect_names,
     estimate,
     figure,
     gap_closed,
     interval,
     percent,
-    readable,
     signal_name,
     signal_unit,
     undetermined_text,
     unit_cell,
 )
+from pma_gym.discovery.result.estimates import Moved, NamedEffect
+from pma_gym.discovery.result.misfit import Gap, Place
+from pma_gym.discovery.result.noise import Floor, Judgement
 from pma_gym.discovery.verdict.adequacy import MOST_EXPLAINED, MOST_FLOORS
 from pma_gym.pages.document import TextTable
 

@@ -2,8 +2,9 @@
 
 from pma_gym.discovery.diagnosis import Diagnosis
 from pma_gym.discovery.report.approximate_text import left_text
+from pma_gym.discovery.report.effect_text import effect_name, effect_names
+from pma_gym.discovery.report.figure_text import figure, percent, signal_name
 from pma_gym.discovery.report.size_text import sized_effects
-from pma_gym.discovery.report.text import effect_name, effect_names, figure, percent, signal_name
 from pma_gym.discovery.verdict.residual_laws import LAWS
 from pma_gym.discovery.verdict.unknown import Reason
 

@@ -2,25 +2,25 @@
 
 import numpy as np
 
-from pma_gym.discovery.diagnosis import ADDED, Diagnosis, Verdict
+from pma_gym.discovery.diagnosis import Diagnosis, Verdict
 from pma_gym.discovery.fitting.fit_problem import Fitted
 from pma_gym.discovery.fitting.free_parameters import FreeParameters, unit
 from pma_gym.discovery.report.adequacy_text import agreement, remainder, undecided
 from pma_gym.discovery.report.approximate_text import left_text
-from pma_gym.discovery.report.noise_text import nuisance_text
-from pma_gym.discovery.report.size_text import sized_effects
-from pma_gym.discovery.report.text import (
+from pma_gym.discovery.report.effect_text import effect_name, effect_names
+from pma_gym.discovery.report.figure_text import (
     at_its_limit,
     chance,
-    effect_name,
-    effect_names,
     figure,
     listed,
     percent,
     signal_name,
     signal_unit,
 )
+from pma_gym.discovery.report.noise_text import nuisance_text
+from pma_gym.discovery.report.size_text import sized_effects
 from pma_gym.discovery.report.unknown_text import unknown_sentence
+from pma_gym.discovery.result.candidate import ADDED
 from pma_gym.discovery.selection.backward_elimination import ODDS
 from pma_gym.discovery.verdict.adequacy import OPEN
 from pma_gym.discovery.verdict.decision import MOST_RIVALS, MOVED_CHANGE, UNDETECTABLE_SHARE
@@ -28,6 +28,15 @@ from pma_gym.discovery.verdict.findings import Findings
 from pma_gym.discovery.verdict.residual_fraction import ResidualFraction
 from pma_gym.discovery.verdict.unknown import Reason
 from pma_gym.units import with_unit
+
+VERDICTS = {
+    "effect": "An effect is missing",
+    "parameters": "Parameters were off",
+    "agrees": "Model and data agree",
+    "unknown": "Something unknown is missing",
+    "undecidable": "Undecidable from these data",
+}
+"""Each verdict in a few words."""
 
 ALIKE = 0.9
 """Correlation from which on two parameters do the same to the signals."""

@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pma_gym.data.signals import Signal
-from pma_gym.discovery.diagnosis import Map, Place
 from pma_gym.discovery.fitting.fit_problem import Fitted
 from pma_gym.discovery.preparation.whitened_residuals import WhitenedResiduals
+from pma_gym.discovery.result.misfit import Map, Place
 from pma_gym.discovery.screening.condition_axes import condition_axes
 from pma_gym.discovery.screening.regions import LARGEST, SMALLEST, Region, single_regions
 from pma_gym.discovery.screening.residual_maps import residual_map

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pma_gym.data.signals import Signal
-from pma_gym.discovery.diagnosis import Map
+from pma_gym.discovery.result.misfit import Map
 from pma_gym.discovery.screening.condition_axes import Axis, condition_axes
 from pma_gym.discovery.screening.time_bins import TimeBins
 

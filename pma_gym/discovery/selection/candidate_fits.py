@@ -10,13 +10,10 @@ from pma_gym.discovery.fitting.fit_problem import FitProblem, Fitted
 from pma_gym.discovery.fitting.free_parameters import values
 from pma_gym.discovery.fitting.journal import Journal
 from pma_gym.discovery.preparation.whitened_residuals import WhitenedResiduals
-from pma_gym.discovery.screening.score_test import (
-    Baseline,
-    ScannedRange,
-    ScreeningScore,
-    scanned_range,
-    starting_points,
-)
+from pma_gym.discovery.screening.probe_scores import Baseline
+from pma_gym.discovery.screening.scanned_range import ScannedRange, scanned_range
+from pma_gym.discovery.screening.score_test import ScreeningScore
+from pma_gym.discovery.screening.starting_points import starting_points
 from pma_gym.document_shape import ANY, ListOf, Real, check_shape
 from pma_gym.effects import CATALOGUE
 from pma_gym.plant.model import Model

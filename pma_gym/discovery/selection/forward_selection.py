@@ -13,11 +13,12 @@ noise.
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
-from pma_gym.discovery.diagnosis import Undetermined
 from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
 from pma_gym.discovery.fitting.covariance import covariance
 from pma_gym.discovery.fitting.fit_problem import FitProblem, Fitted
 from pma_gym.discovery.fitting.journal import Journal
+from pma_gym.discovery.result.estimates import Undetermined
+from pma_gym.discovery.screening.probe_scores import Baseline
 from pma_gym.discovery.screening.residuals import (
     far_off,
     is_autocorrelated,
@@ -25,7 +26,8 @@ from pma_gym.discovery.screening.residuals import (
     scan_of_fit,
 )
 from pma_gym.discovery.screening.scan_statistic import NO_EXCESS, ScanStatistic
-from pma_gym.discovery.screening.score_test import Baseline, ScreeningScore, refined_score, screen
+from pma_gym.discovery.screening.score_test import ScreeningScore, screen
+from pma_gym.discovery.screening.starting_points import refined_score
 from pma_gym.discovery.selection.candidate_fits import (
     better,
     cost,

@@ -10,7 +10,7 @@ its growth with pressure, count as one.
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from pma_gym.discovery.diagnosis import Gap
+from pma_gym.discovery.result.misfit import Gap
 from pma_gym.effects import CATALOGUE
 
 MOST_LEFT = 0.15

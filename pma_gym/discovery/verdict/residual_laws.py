@@ -10,9 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pma_gym.discovery.diagnosis import ResidualLaw
 from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
 from pma_gym.discovery.fitting.fit_problem import FitProblem, Fitted
+from pma_gym.discovery.result.misfit import ResidualLaw
 from pma_gym.effects import CATALOGUE
 from pma_gym.plant import sensors
 from pma_gym.units import SI_FACTORS

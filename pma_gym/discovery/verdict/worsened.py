@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from pma_gym.discovery.diagnosis import TrialRecord
+from pma_gym.discovery.result.misfit import TrialRecord
 
 Array = NDArray[np.float64]
 

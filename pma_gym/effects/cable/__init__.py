@@ -1,1 +1,1 @@
-"""The cable between pulley and slide, and what hangs on the pulley beside it."""
+"""The cable between pulley and slide, and the loads at the pulley: hanging weights or a leg."""

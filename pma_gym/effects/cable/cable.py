@@ -1,4 +1,4 @@
-"""The cable between pulley and slide: it pulls, it gives, it has slack; it cannot push."""
+"""The cable between pulley and slide: elastic, damped and with slack; it pulls but cannot push."""
 
 from typing import Annotated, NamedTuple
 
@@ -33,11 +33,11 @@ def tension(stretch, stretch_rate, p):
 
         T = max(0, F + damping s' smoothstep(F / 40 N)),   F = stiffness max(0, s - slack)
 
-    The damper comes in with the spring, so that the cable tightens without a jump of its tension,
-    which no integrator would take in its stride.
+    The damping grows with the spring force. The tension therefore has no jump where the cable
+    tightens; a jump would cost the integrator accuracy.
 
     Args:
-        stretch: cable wound in less the way of the slide, s (m).
+        stretch: length of cable wound in minus the travel of the slide, s (m).
         stretch_rate: s' (m/s).
         p: Cable: stiffness (N/m), damping (N s/m), slack (m).
     Returns:
@@ -51,25 +51,25 @@ def tension(stretch, stretch_rate, p):
 
 
 def tightness(stretch, p):
-    """How far the cable is wound in beyond its slack; the tension has a kink at 0.
+    """Stretch of the cable beyond its slack; the tension has a kink where it is 0.
 
     Args:
-        stretch: cable wound in less the way of the slide (m).
+        stretch: length of cable wound in minus the travel of the slide (m).
         p: Cable.
     Returns:
-        Way (m), negative while the cable hangs slack.
+        Distance (m), negative while the cable is slack.
     """
     return stretch - p.slack
 
 
 def full_damping(stretch, p):
-    """How far the cable is wound in beyond where all of its damper acts; the tension bends at 0.
+    """Stretch of the cable beyond the point of full damping; the law changes form where it is 0.
 
     Args:
-        stretch: cable wound in less the way of the slide (m).
+        stretch: length of cable wound in minus the travel of the slide (m).
         p: Cable.
     Returns:
-        Way (m), negative while some of the damper is missing.
+        Distance (m), negative while the damping is partial.
     """
     return stretch - p.slack - 2.0 * TIGHT_FORCE / p.stiffness
 

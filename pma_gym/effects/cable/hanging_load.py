@@ -1,4 +1,4 @@
-"""A load that hangs on the cable: its weight pulls, and its mass must be moved."""
+"""A weight that hangs on the cable: a load with inertia."""
 
 from typing import Annotated, NamedTuple
 
@@ -10,7 +10,7 @@ GRAVITY = 9.80665
 
 
 class HangingLoad(NamedTuple):
-    """How much of the load hangs; the plant reads it itself."""
+    """Share of the load that is a hanging weight; the plant reads it directly."""
 
     share: Annotated[
         float, Quantity("1", 0, 1, "1 where weights take the place of a motor", 0.0, usual=1)
@@ -18,7 +18,7 @@ class HangingLoad(NamedTuple):
 
 
 def hanging_inertia(load_asked, radius, p):
-    """Inertia of the weights at the pulley that they hang over.
+    """Inertia of the hanging weights about the axis of the pulley.
 
         J = share r^2 L / g
 

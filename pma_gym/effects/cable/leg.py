@@ -1,4 +1,4 @@
-"""A leg on the lever of the pulley: what is moved beside the rotor, and the damping of the knee."""
+"""A leg on the lever of the pulley: its inertia and the damping of the knee."""
 
 from typing import Annotated, NamedTuple
 
@@ -7,7 +7,7 @@ from pma_gym.units import Quantity
 
 
 class Leg(NamedTuple):
-    """Shank, foot and lever, which turn with the pulley; the plant reads them itself."""
+    """Shank, foot and lever, which turn with the pulley; the plant reads them directly."""
 
     inertia: Annotated[
         float,
@@ -37,7 +37,7 @@ class Leg(NamedTuple):
 
 
 def leg_torque(spin, p):
-    """Torque that the knee's damping takes from the pulley.
+    """Torque of the knee's damping on the pulley.
 
         M = damping theta'
 
@@ -47,7 +47,7 @@ def leg_torque(spin, p):
     Returns:
         Torque (N m), positive against winding in.
     Source:
-        Our model: the joint's viscosity as one number; there is no gravity, as in space.
+        Our model: one viscous coefficient for the joint, and no gravity, as in space.
     """
     return p.damping * spin
 

@@ -1,1 +1,1 @@
-"""What a drive moves that imposes a motion: the motion, and what resists it beside a muscle."""
+"""Rigs whose drive imposes a motion: that motion, and the forces that resist it beside a muscle."""

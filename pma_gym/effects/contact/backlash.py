@@ -1,4 +1,4 @@
-"""Backlash: lost motion between the drive and what rubs."""
+"""Backlash: lost motion between the drive and the parts that rub."""
 
 from typing import Annotated, NamedTuple
 
@@ -14,19 +14,20 @@ class Backlash(NamedTuple):
 
 
 def lost_motion(memory, travel, p):
-    """Place in the gap after a travel that nothing resists.
+    """Position in the gap after a travel without resistance.
 
         b = clip(b + travel, -width / 2, width / 2)
 
-    What rubs stands still while the gap is crossed. Its bristles relax first, as the drive moves
-    back: `travel` counts from where they exert no force, so that in the gap no force is measured.
+    The rubbing parts stand still while the drive crosses the gap. When the drive reverses, their
+    bristles relax first: `travel` counts from the point where they exert no force, so that no
+    friction is measured in the gap.
 
     Args:
-        memory: place b in the gap where the travel began (m), from its middle.
+        memory: position b in the gap where the travel began (m), from its middle.
         travel: displacement since the bristles relaxed (m), in the direction of contraction.
         p: Backlash: width (m), from stop to stop.
     Returns:
-        Place in the gap (m).
+        Position in the gap (m).
     Source:
         Play between two stops in line with a friction element without mass.
     """

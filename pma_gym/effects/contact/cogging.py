@@ -1,4 +1,4 @@
-"""A force that comes again with the way: cogging of magnets, ripple of a screw or a guide."""
+"""A force that is periodic in position: cogging of magnets, ripple of a screw or a guide."""
 
 from typing import Annotated, NamedTuple
 
@@ -17,7 +17,7 @@ class Cogging(NamedTuple):
 
 
 def cogging_force(contraction, p):
-    """Force that is periodic in the position, and takes no energy.
+    """Conservative force that is periodic in the position.
 
         F = amplitude cos(2 pi periods x + phase)
 
@@ -27,7 +27,7 @@ def cogging_force(contraction, p):
     Returns:
         Force (N); positive in the direction of contraction.
     Source:
-        First harmonic of what magnets and teeth do.
+        First harmonic of the cogging of magnets and teeth.
     """
     # The part of a period alone: `cosine` is a series that is right near zero.
     turns = p.periods * contraction

@@ -1,4 +1,4 @@
-"""A force that never changes: a weight, a preload, a load cell's zero."""
+"""A constant force: a weight, a preload, a load cell's zero offset."""
 
 from typing import Annotated, NamedTuple
 
@@ -19,12 +19,12 @@ class ConstantTorque(NamedTuple):
 
     @property
     def force(self) -> float:
-        """The same by the name that the law has for it (N m)."""
+        """The torque (N m), under the name that the law uses."""
         return self.torque
 
 
 def constant_force(p):
-    """Force that depends on nothing.
+    """Constant force.
 
         F = force
 
@@ -33,7 +33,7 @@ def constant_force(p):
     Returns:
         Force (N, N m); positive in the direction in which the position grows.
     Source:
-        None needed. Logs in one direction cannot tell it from dry friction.
+        None needed. Logs in one direction of motion cannot distinguish it from dry friction.
     """
     return p.force
 

@@ -1,7 +1,8 @@
-"""Dry friction of a contact that a drive moves over, and how it grows with pressure.
+"""Dry friction of a contact that a drive moves, constant or proportional to pressure.
 
-Two terms of one law: bristles that are elastic while they turn and slip at a force that is the
-same at every speed. A motion that is imposed shows their deflection, which a slide hides.
+Both are terms of one bristle law: the bristles deflect elastically after a reversal and slip at a
+force that does not depend on speed. An imposed motion shows the deflection in its data; a free
+slide does not.
 """
 
 from typing import Annotated, NamedTuple
@@ -32,7 +33,7 @@ class PressureFriction(NamedTuple):
 
 
 def contact_friction(memory, p):
-    """Force of the bristles.
+    """Friction force of the bristles.
 
         F = -force z
 
@@ -48,7 +49,7 @@ def contact_friction(memory, p):
 
 
 def pressure_friction(pressure, memory, p):
-    """Force of the bristles, in proportion to the pressure on them.
+    """Friction force of the bristles, proportional to the pressure on them.
 
         F = -slope max(0, P) z
 
@@ -59,7 +60,7 @@ def pressure_friction(pressure, memory, p):
     Returns:
         Force (N); positive in the direction of contraction.
     Source:
-        Coulomb's law for a lip that the pressure presses on; what it has without pressure is
+        Coulomb's law for a seal lip that the pressure presses on; its friction without pressure is
         `contact_friction`.
     """
     return -p.slope * positive(pressure) * memory

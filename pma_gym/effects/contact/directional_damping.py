@@ -1,4 +1,4 @@
-"""Viscous friction that is larger in one direction: lips, ramps, valves that open one way."""
+"""Viscous friction that is larger in one direction: seal lips, ramps, one-way valves."""
 
 from typing import Annotated, NamedTuple
 
@@ -19,7 +19,7 @@ class JointDirectionalDamping(NamedTuple):
 
 
 def directional_force(velocity, p):
-    """What forward motion is braked more than backward motion, beside a damping of both.
+    """Difference of viscous friction between forward and backward motion.
 
         F = -difference / 2 |v|
 
@@ -28,9 +28,10 @@ def directional_force(velocity, p):
         p: DirectionalDamping or JointDirectionalDamping: difference of the coefficients forwards
             and back (N s/m, N m s).
     Returns:
-        Force (N, N m), backwards in both directions; the mean of both is viscous damping.
+        Force (N, N m), backward in both directions of motion; the mean of the two directions is
+        the viscous damping.
     Source:
-        None: the part of a piecewise linear friction that is even in speed.
+        Ours: the part of a piecewise linear friction that is even in speed.
     """
     return -0.5 * p.difference * abs(velocity)
 

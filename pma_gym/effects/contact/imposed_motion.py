@@ -1,4 +1,4 @@
-"""A motion that another drive imposes: a tensile tester, a cylinder, a shaker."""
+"""A motion that an external drive imposes: a tensile tester, a cylinder, a shaker."""
 
 from typing import Annotated, NamedTuple
 
@@ -6,9 +6,9 @@ from pma_gym.effects.effect import Effect
 from pma_gym.units import Quantity
 
 FOLLOWING = 2.0
-"""Corner of the states that follow the motion, in bandwidths of its record: `motion_command`
-takes their lag out beforehand. Not much faster: between rows the command is a line, and states
-that are faster than the rows would move by its slopes."""
+"""Corner frequency of the states that follow the motion, in bandwidths of its record.
+`motion_command` compensates their lag. A much higher corner would follow the straight lines
+between the rows of the record and not the motion."""
 
 _TURN = 6.283185307179586
 
@@ -25,17 +25,17 @@ class ImposedMotion(NamedTuple):
 
 
 def following_rate(p):
-    """Corner (rad/s) of the states that follow the motion."""
+    """Corner frequency (rad/s) of the states that follow the motion."""
     return _TURN * FOLLOWING * p.bandwidth
 
 
 def imposed_acceleration(command, contraction, velocity, p):
-    """Acceleration of what is moved, which follows a command without overshoot.
+    """Acceleration of the moved part, which follows a command without overshoot.
 
         x'' = w^2 (c - x) - 2 w x',   w = 2 pi 2 bandwidth
 
     Args:
-        command: position c that is asked for (m), the record ahead of the states' lag.
+        command: commanded position c (m), the record advanced by the lag of the states.
         contraction: position x (m).
         velocity: its rate (m/s).
         p: ImposedMotion: bandwidth (Hz) at which the record's amplitude is halved.

@@ -1,4 +1,4 @@
-"""Dry friction that grows with the force of the drive: gears, worms, screws."""
+"""Dry friction that grows with the transmitted force: gears, worms, screws."""
 
 from typing import Annotated, NamedTuple
 
@@ -33,36 +33,36 @@ class JointLoadFriction(NamedTuple):
 
 
 def load_friction(drive_force, carried_force, memory, p):
-    """Force of the bristles, in proportion to what presses the teeth on both sides of the gears.
+    """Friction force of the bristles, proportional to the forces on both sides of a gear.
 
         F = -(drive_share |F_drive| + carried_share |F_carried|) z
 
     Args:
         drive_force: force or torque of the drive F_drive (N, N m).
-        carried_force: force or torque that the rig carries F_carried, of weight, springs and what
-            is constant (N, N m).
+        carried_force: force or torque that the rig carries F_carried: weight, springs and
+            constant forces (N, N m).
         memory: deflection z of the bristles, between -1 and 1; see `friction_path`.
         p: LoadDependentFriction or JointLoadFriction: drive_share, carried_share, presliding
             (m, rad).
     Returns:
         Force (N, N m), against the motion.
     Source:
-        Coulomb's law for teeth that both sides press on each other, a share of each side as in the
-        friction models of Rhoban's bam; what rubs without a load is dry friction beside it.
+        Coulomb's law for the teeth of a gear, with a share of the force on each side as in the
+        friction models of Rhoban's bam. Friction without a load is a separate dry friction.
     """
     level = p.drive_share * abs(drive_force) + p.carried_share * abs(carried_force)
     return -level * memory
 
 
 def load_friction_bend(memory, direction, p):
-    """Way to where the deflection begins to bend over, or to where all bristles slip.
+    """Distance to the point where the bristles begin to slip, or to where all of them slip.
 
     Args:
         memory: z where the travel begins.
         direction: 1 where the motion is forwards, else -1.
         p: parameters with drive_share, carried_share and presliding (m, rad).
     Returns:
-        Way (m, rad), 0 where all slip or nothing rubs.
+        Distance (m, rad), 0 where all bristles slip or there is no friction.
     """
     return where(p.drive_share + p.carried_share > 0.0, p.presliding, 0.0) * elastic_way(
         memory, direction

@@ -15,13 +15,13 @@ class PistonForce(NamedTuple):
 
 
 def piston_force(pressure, p):
-    """Force of a pressure on an area.
+    """Force of a pressure on the piston's area.
 
         F = area P
 
     Args:
         pressure: gauge pressure P (Pa).
-        p: PistonForce: area (m^2), that of the rod taken off where it passes through.
+        p: PistonForce: area (m^2), less the rod's area where the rod passes through.
     Returns:
         Force (N); positive in the direction of contraction, in which the pressure pushes.
     Source:

@@ -1,4 +1,4 @@
-"""Drag with the square of speed: air, a fan, oil through an orifice."""
+"""Drag proportional to the square of speed: air, a fan, oil through an orifice."""
 
 from typing import Annotated, NamedTuple
 
@@ -23,7 +23,7 @@ class JointDrag(NamedTuple):
 
 
 def drag_force(velocity, p):
-    """Force against the motion, with the square of its speed.
+    """Force against the motion, proportional to the square of its speed.
 
         F = -coefficient v |v|
 
@@ -31,7 +31,7 @@ def drag_force(velocity, p):
         velocity: speed v (m/s, rad/s).
         p: QuadraticDrag or JointDrag: coefficient (N s^2/m^2, N m s^2).
     Returns:
-        Force (N, N m); positive in the direction of motion.
+        Force (N, N m); positive in the positive direction of the speed.
     Source:
         Textbooks on fluid mechanics: drag at high Reynolds numbers.
     """

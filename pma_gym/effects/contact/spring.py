@@ -1,4 +1,4 @@
-"""Springs: in proportion to the way, and hardening with its cube."""
+"""Springs: linear, and hardening with the cube of the displacement."""
 
 from typing import Annotated, NamedTuple
 
@@ -41,7 +41,7 @@ def linear_spring(position, p):
         position: x (m, rad).
         p: Spring or JointSpring: stiffness (N/m, N m/rad), rest (m, rad).
     Returns:
-        Force (N, N m), towards where the spring is relaxed.
+        Force (N, N m), towards the position where the spring is relaxed.
     Source:
         Hooke's law.
     """
@@ -54,10 +54,10 @@ def cubic_spring(position, p):
         F = -cubic x^3
 
     Args:
-        position: x from where it is relaxed (m, rad).
+        position: displacement x from the relaxed position (m, rad).
         p: HardeningSpring or JointHardeningSpring: cubic (N/m^3, N m/rad^3).
     Returns:
-        Force (N, N m), towards where the spring is relaxed.
+        Force (N, N m), towards the relaxed position.
     Source:
         G. Duffing 1918.
     """

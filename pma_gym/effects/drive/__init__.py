@@ -1,1 +1,1 @@
-"""The motor side: from voltage to load, with the rotor and what departs from a straight line."""
+"""The drive: from motor voltage to cable load, with the rotor and the drive's nonlinearities."""

@@ -20,7 +20,7 @@ class BearingFriction(NamedTuple):
 
 
 def bearing_drag(memory):
-    """Load that friction takes from what arrives at the pulley.
+    """Load that bearing friction takes from the load at the pulley.
 
         L = -f
 
@@ -37,8 +37,8 @@ def bearing_drag(memory):
 def bearing_rate(spin, memory, p):
     """Rate of the friction: f' = (force theta' - |theta'| f) / presliding.
 
-    It depends on the way alone and goes to the force in either direction. At a force of 0 it stays
-    exactly 0.
+    The friction depends on the distance turned, not on speed, and tends to the force in the
+    direction of motion. At a force of 0 it stays exactly 0.
 
     Args:
         spin: rate of the pulley's angle theta' (rad/s).
@@ -52,13 +52,13 @@ def bearing_rate(spin, memory, p):
 
 
 def bearing_turn(spin, p):
-    """Where the pulley turns, the friction goes another way.
+    """Event function: the friction changes form where the pulley reverses.
 
     Args:
         spin: rate of the pulley's angle (rad/s).
         p: BearingFriction.
     Returns:
-        The same (rad/s); 1 where there is no friction.
+        The rate (rad/s); 1 where there is no friction.
     """
     there = where(p.force > 0.0, 1.0, 0.0)
     return there * spin + (1.0 - there)

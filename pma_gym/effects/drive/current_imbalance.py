@@ -1,4 +1,4 @@
-"""The phases of a brushless motor do not get equal currents: its torque swings as it turns."""
+"""Unequal phase currents of a brushless motor, whose torque then varies with the shaft's angle."""
 
 from typing import Annotated, NamedTuple
 
@@ -23,32 +23,32 @@ class CurrentImbalance(NamedTuple):
 
 
 def imbalance_load(load_arriving, motor_angle, p):
-    """Load on top of the motor's mean, by where its shaft stands.
+    """Load in addition to the motor's mean load, as a function of the shaft's angle.
 
         L = amplitude L_mean cos(periods (theta - x0 / r) + phase)
 
-    Amplifiers of the phases whose gains differ by a share e make the torque swing by up to e, in
-    proportion to the current and twice an electrical turn, so 2 to 12 times a turn of the shaft.
-    Where in the turn is the shaft's own: the cable ties the shaft to the slide, so that the peaks
-    stand at the same contractions at every pressure, while an angle that counts from where the
-    muscle has no load (as that of `torque_ripple`) begins elsewhere at each.
+    If the gains of the phase amplifiers differ by a share e, the torque varies by up to e. The
+    variation is proportional to the current and has two periods per electrical turn, so 2 to 12
+    per turn of the shaft. The phase belongs to the shaft. Because the cable ties the shaft to the
+    slide, the peaks stand at the same contractions at every pressure. An angle that counts from
+    the unloaded muscle (as that of `torque_ripple`) has another zero at every pressure.
 
     Args:
         load_arriving: mean load L_mean (N).
         motor_angle: angle of the shaft theta - x0 / r (rad) from where the cable is straight at
             the muscle's resting length.
-        p: CurrentImbalance: amplitude (share), periods a turn, phase (rad).
+        p: CurrentImbalance: amplitude (share), periods per turn, phase (rad).
     Returns:
         Load (N), added.
     Source:
         1. D.-W. Chung, S.-K. Sul 1998, "Analysis and compensation of current measurement error in
-           vector-controlled AC motor drives", IEEE Trans. Ind. Appl. 34(2), 340-345: errors of
-           scale ripple twice an electrical turn.
-        2. Serres 2008, table I3: the measured load goes round the line through the voltage by
-           2.7 % of itself, 5.9 times a turn; pressures left out of that fit scatter by 6 N about
-           it and by 12 N about the line, the repeats by 4. The dissertation calls the motor (a
-           Pacific Scientific PMA45N) a DC servo and gives no number of poles: three pairs are our
-           reading.
+           vector-controlled AC motor drives", IEEE Trans. Ind. Appl. 34(2), 340-345: gain errors
+           cause a ripple of two periods per electrical turn.
+        2. Serres 2008, table I3: the measured load varies about the straight line in voltage
+           by 2.7 %, with 5.9 periods per turn. Pressures that were left out of the fit scatter by
+           6 N about it, by 12 N about the line, and repeats scatter by 4 N. The dissertation calls
+           the motor (a Pacific Scientific PMA45N) a DC servo and gives no number of poles: three
+           pairs are our reading.
     """
     return p.amplitude * load_arriving * cosine(p.periods * motor_angle + p.phase)
 

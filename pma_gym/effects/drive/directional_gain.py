@@ -1,4 +1,4 @@
-"""A drive that gives more force in one direction than in the other for the same command."""
+"""A drive whose gain differs between the two directions of its force."""
 
 from typing import Annotated, NamedTuple
 
@@ -15,12 +15,12 @@ class DirectionalGain(NamedTuple):
 
 
 def gain_by_direction(drive_force, p):
-    """What a drive gives more forwards, and less backwards.
+    """Force that a drive gives in excess forwards, and too little backwards.
 
         F = difference / 2 |F_drive|
 
     Args:
-        drive_force: force or torque that it would give F_drive (N, N m).
+        drive_force: force or torque of the drive with its mean gain F_drive (N, N m).
         p: DirectionalGain: difference of the gains over their mean.
     Returns:
         Force (N, N m); positive forwards.

@@ -1,4 +1,4 @@
-"""The servo drive in torque mode: a load in the cable asked for by a voltage."""
+"""The servo drive in torque mode: a voltage commands a load in the cable."""
 
 from typing import Annotated, NamedTuple
 
@@ -22,7 +22,7 @@ class Drive(NamedTuple):
 
 
 def drive_load(motor_voltage, p):
-    """Load that the drive asks for, never below zero: it cannot unwind the cable.
+    """Load that the drive commands, never below zero: it cannot unwind the cable.
 
         L = max(0, gain V + offset)
 

@@ -1,4 +1,4 @@
-"""Small commands move nothing: the drive's amplifier and brushes swallow them."""
+"""Dead zone of the drive: small commands move nothing."""
 
 from typing import Annotated, NamedTuple
 
@@ -7,8 +7,8 @@ from pma_gym.effects.effect import Effect
 from pma_gym.units import Quantity
 
 CATCHING_UP = 2.0
-"""Slope with which the load catches up where a model file does not say: our assumption, and what
-files meant before the slope was a parameter."""
+"""Slope beyond the dead zone if a model file does not give one: our assumption. Files from before
+the slope was a parameter have this value."""
 
 
 class DriveDeadZone(NamedTuple):
@@ -24,16 +24,16 @@ class DriveDeadZone(NamedTuple):
 
 
 def load_beyond_dead_zone(load, p):
-    """Load that a drive with a dead zone asks for.
+    """Load that a drive with a dead zone commands.
 
         L_out = min(L, slope max(0, L - width))
 
-    Nothing up to the width; from slope / (slope - 1) times the width on, twice it at a slope of 2,
-    the load is what it was. A dead zone that stayed behind for ever (slope 1) would be an offset of
-    `drive`, and no data could tell them apart. Without a width the slope does nothing.
+    The load is 0 up to the width, and equals L from slope / (slope - 1) times the width on (twice
+    the width at a slope of 2). A dead zone that never catches up (slope 1) would equal an offset of
+    `drive`; no data could distinguish the two. At a width of 0 the slope has no effect.
 
     Args:
-        load: load L that the drive would ask for without it (N), not negative.
+        load: load L that the drive would command without a dead zone (N), not negative.
         p: DriveDeadZone: width (N), slope (1), more than 1.
     Returns:
         Load (N), not negative.

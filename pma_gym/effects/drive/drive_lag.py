@@ -1,4 +1,4 @@
-"""The drive's load follows its command late: the current loop has a bandwidth."""
+"""First-order lag of the drive's load, from the bandwidth of its current loop."""
 
 from typing import Annotated, NamedTuple
 
@@ -24,22 +24,22 @@ def late_load(load_command, memory, p):
         L_out = (1 - share) L + m
 
     Args:
-        load_command: load L that the drive asks for (N).
-        memory: part m that comes late (N); share L once it is there.
+        load_command: load L that the drive commands (N).
+        memory: lagging part m (N); share L at rest.
         p: DriveLag: share, time_constant (s).
     Returns:
         Load (N).
     Source:
-        First-order lag; a share less than 1 lets the rest through at once, and 0 everything.
+        First-order lag; the part 1 - share of the load has no lag.
     """
     return (load_command - p.share * load_command) + memory
 
 
 def late_rate(load_command, p):
-    """Rate of the part that comes late: m' = (share L - m) / time_constant.
+    """Rate of the lagging part: m' = (share L - m) / time_constant.
 
     Args:
-        load_command: load L that the drive asks for (N).
+        load_command: load L that the drive commands (N).
         p: DriveLag.
     Returns:
         (source, decay) with m' = source - decay * m (N/s).

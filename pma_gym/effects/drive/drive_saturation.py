@@ -1,4 +1,4 @@
-"""The drive's amplifier limits its current, so its load."""
+"""Saturation of the drive: the amplifier limits the current and so the load."""
 
 from typing import Annotated, NamedTuple
 
@@ -7,7 +7,7 @@ from pma_gym.effects.effect import Effect
 from pma_gym.units import Quantity
 
 BOUNDLESS_N = 20e3
-"""More than any `drive` within its bounds can ask for (10.1 kN)."""
+"""More than any `drive` within its bounds can command (10.1 kN)."""
 
 
 class DriveSaturation(NamedTuple):
@@ -27,17 +27,17 @@ class DriveSaturation(NamedTuple):
 
 
 def limited_load(load, p):
-    """Load that the limit of the current leaves.
+    """Load after the limit of the current.
 
         L_out = min(L, limit)
 
     Args:
-        load: load L that the drive would ask for without it (N).
+        load: load L that the drive would command without a limit (N).
         p: DriveSaturation: limit (N), torque constant times current limit over pulley radius.
     Returns:
         Load (N).
     Source:
-        Every servo amplifier has one; Serres 2008 gives none.
+        Every servo amplifier has a current limit; Serres 2008 gives none.
     """
     return load - positive(load - p.limit)
 

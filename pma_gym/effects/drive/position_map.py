@@ -10,7 +10,7 @@ _TABLE_18 = "Serres 2008, table 18 (275 and 575 kPa: recovered from tables I13 a
 
 
 class PositionMap(NamedTuple):
-    """Rows of the map, one a pressure; pressures increase."""
+    """Rows of the map, one per pressure; pressures increase."""
 
     pressure: Annotated[tuple[float, ...], Quantity("kPa", 0, 1000, _TABLE_18)]
     square: Annotated[tuple[float, ...], Quantity("m/V^2", -0.1, 0.1, _TABLE_18)]
@@ -24,12 +24,13 @@ row with a positive constant, it rises to the printed parabola within 10 mV."""
 
 
 def mapped_displacement(motor_voltage, pressure, p):
-    """Displacement that a motor voltage leads to at rest, never below zero; 0 V gives 0.
+    """Displacement at rest for a motor voltage, never below zero; 0 V gives 0.
 
         x_in = max(0, min(square V^2 + linear V + constant, 10 linear V))
 
-    The coefficients are linear in pressure between rows and constant beyond them. Past its peak
-    the parabola is held at the peak: more voltage never pulls less.
+    The coefficients are linear in pressure between rows and constant beyond them. Beyond its
+    peak the parabola keeps the value of the peak, so that more voltage never gives less
+    displacement.
 
     Args:
         motor_voltage: command V (V).

@@ -7,7 +7,7 @@ from pma_gym.units import Quantity
 
 
 class Rotor(NamedTuple):
-    """Inertia, damping and pulley radius of the rotor; the plant reads them itself."""
+    """Inertia, damping and pulley radius of the rotor; the plant reads them directly."""
 
     inertia: Annotated[
         float,

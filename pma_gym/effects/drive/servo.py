@@ -1,4 +1,4 @@
-"""The servo motor of the dissertation's linear model, without and with its inertia."""
+"""The servo motor of the dissertation's linear model, without and with inertia."""
 
 from typing import Annotated, NamedTuple
 
@@ -22,7 +22,7 @@ class Servo(NamedTuple):
 
 
 class ServoInertia(NamedTuple):
-    """Inertia, and the damping ratio that the drive gives it."""
+    """Inertia and damping ratio of the motor's position loop."""
 
     inertia: Annotated[float, Quantity("kg m^2", 1e-9, 1, "assumption: 2.0e-3", usual=0.002)]
     damping_ratio: Annotated[
@@ -40,7 +40,8 @@ def servo_rate(displacement_input, p):
         displacement_input: x_in (m).
         p: Servo: stiffness K_M (N m), damping B_M (N m s).
     Returns:
-        (source, decay) with u' = source - decay * u. The root, 13 428 1/s, is taken exactly.
+        (source, decay) with u' = source - decay * u. The integrator solves this fast pole
+        (13 428 1/s) exactly.
     Source:
         Serres 2008, Eq. 11-15.
     """

@@ -1,4 +1,4 @@
-"""The motor's torque varies with its angle, as often a turn as it has slots or commutator bars."""
+"""Torque ripple of a motor: as many periods per turn as it has slots or commutator bars."""
 
 from typing import Annotated, NamedTuple
 
@@ -23,14 +23,14 @@ class TorqueRipple(NamedTuple):
 
 
 def ripple_load(load_arriving, angle, p):
-    """Load on top of the motor's mean, by its angle.
+    """Load in addition to the motor's mean load, as a function of the pulley's angle.
 
         L = amplitude L_mean cos(periods theta + phase)
 
     Args:
         load_arriving: mean load L_mean (N).
-        angle: pulley angle theta (rad) from where it stands with no load.
-        p: TorqueRipple: amplitude (share), periods a turn, phase (rad).
+        angle: pulley angle theta (rad) from its position without load.
+        p: TorqueRipple: amplitude (share), periods per turn, phase (rad).
     Returns:
         Load (N), added.
     Source:

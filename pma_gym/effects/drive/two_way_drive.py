@@ -1,4 +1,4 @@
-"""A drive on a rigid link, which pushes as well as it pulls."""
+"""A drive on a rigid link, which pushes and pulls."""
 
 from typing import Annotated, NamedTuple
 
@@ -22,7 +22,7 @@ class TwoWayDrive(NamedTuple):
 
 
 def two_way_load(motor_voltage, p):
-    """Load that the drive gives, of either sign.
+    """Load of the drive, of either sign.
 
         L = gain (V - middle)
 
@@ -32,7 +32,7 @@ def two_way_load(motor_voltage, p):
     Returns:
         Load L (N); positive pulls the slide out, against the direction of contraction.
     Source:
-        A current loop that is faster than anything that it moves.
+        Assumption: the current loop is much faster than the mechanics.
     """
     return p.gain * (motor_voltage - p.middle)
 

@@ -1,1 +1,1 @@
-"""A joint that turns: inertia and start, motor, weight, spring, damping and friction."""
+"""A rotary joint: inertia and start, motor, weight, spring, damping and friction."""

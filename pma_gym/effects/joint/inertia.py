@@ -1,4 +1,4 @@
-"""What turns with a joint, and where and how fast it is when a trial begins."""
+"""Moment of inertia of a joint, and its angle and speed at the start of a trial."""
 
 from typing import Annotated, NamedTuple
 
@@ -7,7 +7,7 @@ from pma_gym.units import Quantity
 
 
 class Inertia(NamedTuple):
-    """Moment of inertia about the axis; the rig reads it itself."""
+    """Moment of inertia about the axis; the rig reads it directly."""
 
     inertia: Annotated[
         float, Quantity("kg m^2", 1e-9, 1e5, "assumption: 5e-3, 0.5 kg on 0.1 m", usual=5e-3)
@@ -15,7 +15,7 @@ class Inertia(NamedTuple):
 
 
 class JointStart(NamedTuple):
-    """State of a joint at the beginning; the rig reads it itself."""
+    """Initial state of a joint; the rig reads it directly."""
 
     angle: Annotated[
         float, Quantity("deg", -1e6, 1e6, "each trial's own: its first readings", 0.0, usual=10)

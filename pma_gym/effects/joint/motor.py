@@ -1,4 +1,4 @@
-"""What turns a joint: a drive that holds a torque, or a winding at a voltage."""
+"""Motors of a joint: a torque-controlled drive, or a DC motor at a voltage."""
 
 from typing import Annotated, NamedTuple
 
@@ -13,15 +13,15 @@ class TorqueDrive(NamedTuple):
 
 
 def drive_torque(command, p):
-    """Torque that a drive gives: T = gain T_asked.
+    """Torque of a torque-controlled drive: T = gain T_command.
 
     Args:
-        command: torque that is asked for (N m).
+        command: commanded torque T_command (N m).
         p: TorqueDrive: gain.
     Returns:
         Torque (N m); positive in the direction in which the angle grows.
     Source:
-        A current loop that is faster than anything that it moves.
+        Assumption: the current loop is much faster than the mechanics.
     """
     return p.gain * command
 
@@ -36,7 +36,7 @@ class DcMotor(NamedTuple):
 
 
 def motor_torque(command, spin, p):
-    """Torque of a winding at a voltage, its inductance left out.
+    """Torque of a DC motor at a voltage, without the inductance of its winding.
 
         T = kt / R (U - kt w)
 
@@ -47,7 +47,7 @@ def motor_torque(command, spin, p):
     Returns:
         Torque (N m); positive in the direction in which the angle grows.
     Source:
-        Textbooks on direct-current motors: torque constant and back-EMF constant are one in SI.
+        Textbooks on direct-current motors: in SI, torque and back-EMF constant are equal.
     """
     return p.torque_constant / p.resistance * (command - p.torque_constant * spin)
 

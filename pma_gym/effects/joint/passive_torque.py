@@ -1,4 +1,4 @@
-"""Torques at a joint that need no command: weight, viscous damping, dry friction."""
+"""Passive torques at a joint: weight, viscous damping, dry friction."""
 
 import math
 from typing import Annotated, NamedTuple
@@ -34,9 +34,9 @@ def weight_torque(angle, p):
 
     Args:
         angle: of the joint q (rad).
-        p: JointWeight: moment m g l (N m), offset (rad) of the angle's zero from hanging down.
+        p: JointWeight: moment m g l (N m), offset (rad) of the angle's zero from the lowest point.
     Returns:
-        Torque (N m), towards hanging down.
+        Torque (N m), towards the lowest point.
     Source:
         Statics of a rigid body about a fixed axis.
     """
@@ -64,7 +64,7 @@ def damping_torque(spin, p):
 
 
 class JointFriction(NamedTuple):
-    """Parameters of `friction_force`, of a torque about an axis."""
+    """Parameters of `friction_force` for a torque about an axis."""
 
     static: Annotated[float, Quantity("N m", 0, 1e4, "assumption: 0.02", 0.0, usual=0.02)]
     dynamic: Annotated[float, Quantity("N m", 0, 1e4, "assumption: 0.015", 0.0, usual=0.015)]

@@ -1,1 +1,1 @@
-"""The muscle: rival force laws, spring, damping, hysteresis, creep and warm-up."""
+"""The muscle: alternative force laws, spring, damping, hysteresis, creep and warm-up."""

@@ -1,8 +1,8 @@
 """Colbrunn's muscle: a spring, a viscous damper and dry friction in parallel.
 
-The spring is here. The damper is `damping` with contracting = relaxing = high_intercept and
-high_slope = 0, and the friction of tube on braid is `coulomb_friction`: a model that names the
-three has Colbrunn's muscle, and neither of those laws has a second copy.
+This file holds the spring. The damper is `damping` with contracting = relaxing = high_intercept
+and high_slope = 0; the friction of tube on braid is `coulomb_friction`. A model with these three
+effects has Colbrunn's muscle.
 """
 
 from typing import Annotated, NamedTuple
@@ -31,11 +31,11 @@ def colbrunn_spring(pressure, contraction, p):
         F = (stiffness + stiffening P) s (1 + (s / hardening_length)^2)
         s = reach P / (P + half_pressure) - x
 
-    s is how far the muscle is longer than where it carries nothing.
+    s is the extension beyond the length at which the muscle exerts no force.
 
-    Departure: Serres 2008 describes the three elements but prints no formula, and the spring's
-    polynomial of the source was not open to us. This one has what is described, a nonlinear force
-    against length that pressure drives, and is our own.
+    Departure: Serres 2008 describes the three elements but prints no formula, and we had no access
+    to the source's polynomial. This form is ours; it has the described property, a nonlinear
+    force-length relation that pressure drives.
 
     Args:
         pressure: gauge pressure P (Pa).

@@ -37,8 +37,8 @@ def contractile_force(pressure, p):
         Force (N); positive shortens the muscle.
     Source:
         Serres 2008, section 5.1.1; fitted on 186-1262 N, extrapolated above 429 kPa, where it
-        lies 10-15 % above the manufacturer's curve by the dissertation's own comparison (19 %
-        above the 1500 N rated at 600 kPa).
+        is 10-15 % above the manufacturer's curve in the dissertation's comparison (19 % above
+            the 1500 N rated at 600 kPa).
     """
     return p.slope * pressure + p.intercept
 

@@ -1,8 +1,8 @@
-"""Creep of rubber and braid: a spring behind a dashpot, beside the muscle (Zener 1948).
+"""Creep of rubber and braid: a Maxwell branch parallel to the muscle (Zener 1948).
 
-A standard linear solid is a spring beside a Maxwell branch, a second spring in line with a dashpot.
-The first spring is the muscle's own force law; here stands the branch. Two of them, a quick and a
-slow one, cover what a muscle does within seconds and within a minute.
+A standard linear solid is a spring parallel to a Maxwell branch (a second spring in series with a
+dashpot). The first spring is the muscle's force law; this file has the branch. A fast and a slow
+branch cover creep within seconds and within a minute.
 """
 
 from typing import Annotated, NamedTuple
@@ -14,7 +14,7 @@ _SHARE = "literature on braided muscles: 1-5 % of the force; 3 % of 20 N/mm is 0
 
 
 class Creep(NamedTuple):
-    """Parameters of the quick branch."""
+    """Parameters of the fast branch."""
 
     stiffness: Annotated[float, Quantity("N/mm", 0, 20, _SHARE, 0.0, usual=0.6)]
     time_constant: Annotated[
@@ -38,11 +38,11 @@ def creep_force(memory):
         F = -f
 
     Args:
-        memory: force f in the branch (N), 0 once the muscle has rested.
+        memory: force f in the branch (N), 0 in a rested muscle.
     Returns:
         Force (N); positive shortens the muscle.
     Source:
-        Standard linear solid (C. Zener 1948), of which this is the branch with the dashpot.
+        Standard linear solid (C. Zener 1948); this is its branch with the dashpot.
     """
     return -memory
 
@@ -50,7 +50,7 @@ def creep_force(memory):
 def creep_rate(velocity, p):
     """Rate of the force in the branch: f' = stiffness x' - f / time_constant.
 
-    What the dashpot loses is f^2 / (stiffness time_constant), never negative. At zero stiffness f
+    The dashpot dissipates f^2 / (stiffness time_constant), never negative. At zero stiffness f
     stays exactly 0.
 
     Args:

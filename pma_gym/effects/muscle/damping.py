@@ -1,4 +1,4 @@
-"""Viscous damping of the muscle: by direction of motion, or the same both ways."""
+"""Viscous damping of the muscle: by direction of motion, or equal in both directions."""
 
 from typing import Annotated, NamedTuple
 
@@ -39,8 +39,8 @@ def damping(pressure, velocity, p):
     Returns:
         Coefficient (N s/m), not negative.
     Source:
-        Serres 2008, table 2. Fitted to pressure steps as if the pressure stepped at once, so the
-        printed values hold part of the regulator's lag.
+        Serres 2008, table 2. The fit assumes that the pressure steps instantly, so the printed
+        values contain part of the regulator's lag.
     """
     high = p.high_intercept + p.high_slope * pressure
     relaxing = where(pressure <= p.breakpoint, p.relaxing, high)
@@ -84,8 +84,8 @@ def symmetric_damping(pressure, p):
     Returns:
         Coefficient (N s/m), not negative.
     Source:
-        Ours: once the regulator fills and vents at paces of its own, the pressure steps of Serres
-        2008, table I2, do not ask for a damping that depends on direction.
+        Ours: with a regulator that fills and vents at different rates, the pressure steps of Serres
+        2008, table I2, need no damping that depends on direction.
     """
     return positive(p.intercept + p.slope * pressure)
 

@@ -1,23 +1,23 @@
-"""Five rival laws of a braided muscle's force from the geometry of its braid.
+"""Five alternative laws of a braided muscle's force, from the geometry of its braid.
 
 Threads of length b wind n turns around a cylinder of length L and diameter d. At the angle alpha
 between thread and axis
 
     L = b cos(alpha),   d = D sin(alpha),   D = b / (pi n) the diameter at 90 deg
 
-so that everything follows from L, n and b, without an angle. The laws take the resting length L0,
+so that L, n and b give all quantities without an angle. The laws take the resting length L0,
 the resting diameter D0 and the turns n, which can all be measured; b^2 = L0^2 + (pi n D0)^2 and
 the resting angle is arctan(pi n D0 / L0). With L = L0 - x, x the contraction:
 
     Eq. 1 McKibben, Schulte    P times the change of volume with length
     Eq. 2 Schulz               Eq. 1, a tube that resists widening, friction
     Eq. 3 Chou, Hannaford      Eq. 1, a wall of constant thickness
-    Eq. 4 Caldwell             Eq. 1, end caps that the tube cannot become narrower than
+    Eq. 4 Caldwell             Eq. 1, end caps that limit the smallest diameter of the tube
     Eq. 5 Tondu, Lopez         Eq. 1, contraction counted k times for the tapered ends
 
-Each stands alone at its port, in place of contractile force and spring. All but Eq. 2 are
-proportional to pressure, so that with no load they contract as far at every pressure: they miss
-Serres 2008, table I3 by 70-140 N. The one elastic number of Eq. 2 takes that to 25 N.
+Each replaces contractile force and spring at its port. All but Eq. 2 are proportional to pressure,
+so that without load they contract equally far at every pressure; their error against Serres 2008,
+table I3, is 70-140 N. The elasticity of Eq. 2 reduces it to 25 N.
 """
 
 from typing import Annotated, NamedTuple
@@ -48,11 +48,11 @@ class SchulteForce(NamedTuple):
 
 
 def schulte_force(pressure, contraction, p):
-    """Force of an ideal braided muscle: pressure times change of volume with length.
+    """Force of an ideal braided muscle: pressure times the change of volume with length.
 
         F = scale pi D^2 P / 4 (3 cos^2(alpha) - 1) = scale P (3 L^2 - b^2) / (4 pi n^2)
 
-    It vanishes at 54.7 deg, whatever the pressure.
+    It vanishes at 54.7 deg at every pressure.
 
     Args:
         pressure: gauge pressure P (Pa).
@@ -100,11 +100,11 @@ def schulz_force(pressure, contraction, p):
         S = elasticity (d - D0) / D0        hoop tension of the tube (N/m)
         P_c = max(0, P - 2 S / d)           pressure left to press the tube against the braid
 
-    Departures: the elastic term as it stands in our copy of the source cannot be read for certain;
-    this one has its factors and follows from the work done, F dx = P dV - dW, with the hoop energy
-    W of a tube of length L0. The contact pressure is never negative. Friction is subtracted as
-    printed, which holds while the muscle contracts; for friction that reverses and sticks leave it
-    at 0 and add `coulomb_friction` or `hysteresis`.
+    Departures: the elastic term is not legible for certain in our copy of the source. The term here
+    has the same factors and follows from the work, F dx = P dV - dW, with the hoop energy W of a
+    tube of length L0. The contact pressure is never negative. Friction is subtracted as printed,
+    which is valid while the muscle contracts. For friction that reverses and sticks, leave it at 0
+    and add `coulomb_friction` or `hysteresis`.
 
     Args:
         pressure: gauge pressure P (Pa).
@@ -199,8 +199,8 @@ def caldwell_force(pressure, contraction, p):
 
         F = scale pi P / 4 (2 D^2 cos^2(alpha) - max(d, D_cap)^2)
 
-    Where the tube is wider than the caps this is Eq. 1, which is Eq. 4b, and Eq. 4a in the
-    thread's length; where it is not, Eq. 4c.
+    Where the tube is wider than the caps this is Eq. 1, which equals Eq. 4b, and Eq. 4a written
+    with the thread's length; elsewhere it is Eq. 4c.
 
     Args:
         pressure: gauge pressure P (Pa).
@@ -244,7 +244,7 @@ def tondu_lopez_force(pressure, contraction, p):
         F = scale pi (D0 / 2)^2 P (a (1 - k x / L0)^2 - b)
         a = 3 / tan^2(alpha0),   b = 1 / sin^2(alpha0) = 1 + a / 3
 
-    The ends stay narrow, so that the middle contracts by more than x / L0: k times as much.
+    The ends stay narrow, so that the middle contracts k times as much as x / L0.
 
     Args:
         pressure: gauge pressure P (Pa).

@@ -42,9 +42,9 @@ def hysteresis_force(memory, p):
 
 
 def hysteresis_path(memory, travel, direction, p):
-    """Hysteretic state after the slide has travelled on without turning.
+    """Hysteretic state after a travel of the slide without a reversal.
 
-    It solves z' = (x' - |x'| z) / distance: z goes to the direction of motion over the distance.
+    It solves z' = (x' - |x'| z) / distance: z tends to the sign of the motion over the distance.
 
     Args:
         memory: z where the travel began.

@@ -1,4 +1,4 @@
-"""Damping that depends on how much of its force the muscle gives."""
+"""Damping that depends on the muscle's load relative to its greatest force."""
 
 from typing import Annotated, NamedTuple
 
@@ -7,7 +7,7 @@ from pma_gym.effects.effect import Effect
 from pma_gym.units import Quantity
 
 ROUNDING = 0.1
-"""Half of the range of loads in which their share bends over to 1: our choice."""
+"""Half-width of the range of loads in which their share levels off at 1: our choice."""
 
 _PEAK = "Serres 2008, table I2 at 250 kPa, 1.3 to 5.2 N s/mm at middle load"
 
@@ -31,8 +31,8 @@ def load_factor(pressure, cable_tension, p):
         B = B_plain max(0, 1 + linear u + quadratic u^2),   u = T / F_ce, at most 1
         F_ce = force_slope P + force_intercept
 
-    u bends over to 1 as a parabola from 0.9 to 1.1: a cable that whips goes through there fast,
-    and a kink would cost accuracy.
+    From 0.9 to 1.1, u levels off at 1 as a parabola: a whipping cable passes this range fast, and
+    a kink would cost accuracy.
 
     Args:
         pressure: gauge pressure P (Pa).
@@ -41,7 +41,7 @@ def load_factor(pressure, cable_tension, p):
     Returns:
         Factor, not negative.
     Source:
-        Our parabola; Serres 2008, table I2 has damping peak at middle load.
+        Our parabola; in Serres 2008, table I2, damping peaks at medium load.
     """
     share = cable_tension / (p.force_slope * pressure + p.force_intercept)
     over = clip((share - (1.0 - ROUNDING)) * (0.5 / ROUNDING), 0.0, 1.0)
@@ -50,14 +50,14 @@ def load_factor(pressure, cable_tension, p):
 
 
 def load_breakpoint(pressure, cable_tension, p):
-    """How far the share of the muscle's force is from where it bends over to 1.
+    """Distance of the load's share from the range in which it levels off at 1.
 
     Args:
         pressure: gauge pressure (Pa).
         cable_tension: load of the muscle (N).
         p: LoadDependentDamping.
     Returns:
-        Share, negative while it bends over; 1 where the effect is absent.
+        Share, negative within that range; 1 where the effect is absent.
     """
     away = abs(cable_tension / (p.force_slope * pressure + p.force_intercept) - 1.0) - ROUNDING
     there = where(abs(p.linear) + abs(p.quadratic) > 0.0, 1.0, 0.0)

@@ -1,4 +1,4 @@
-"""A spring that is not linear: what a constant stiffness leaves out, in contraction alone."""
+"""Nonlinear part of the muscle's spring, as a function of contraction."""
 
 from typing import Annotated, NamedTuple
 
@@ -22,7 +22,7 @@ class NonlinearStiffness(NamedTuple):
 
 
 def stiffening_force(contraction, p):
-    """Force on top of a linear spring, so that both are K x (1 + linear u + quadratic u^2).
+    """Force in addition to a linear spring; both together are -K x (1 + linear u + quadratic u^2).
 
         F = -K x (linear u + quadratic u^2),   u = x / L0
 
@@ -32,8 +32,7 @@ def stiffening_force(contraction, p):
     Returns:
         Force (N); positive shortens the muscle.
     Source:
-        Our form, the simplest there is; `sarosi_force` has a steeper one that also depends on
-        pressure.
+        Our form, a polynomial; `sarosi_force` has a steeper one that also depends on pressure.
     """
     share = contraction / p.resting_length
     return -p.stiffness * contraction * share * (p.linear + p.quadratic * share)

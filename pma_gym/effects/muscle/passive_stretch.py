@@ -1,4 +1,4 @@
-"""Stiffening of bladder and braid when they are pulled beyond the resting length."""
+"""Stiffening of bladder and braid beyond the resting length."""
 
 from typing import Annotated, NamedTuple
 
@@ -30,12 +30,12 @@ class PassiveStretch(NamedTuple):
 
 
 def stretch_force(contraction, p):
-    """Force of the passive material, which pulls back only beyond the resting length.
+    """Force of the passive material, which acts only beyond the resting length.
 
         F = factor (80.67 s + 14.58 s^2 + 0.333 s^3 + 0.417 s^4) N,   s = 100 max(0, -x) / L0
 
-    It comes on top of the force law. One that stiffens there by itself, such as `sarosi_force`,
-    holds part of it already.
+    It adds to the force law. A force law that stiffens there, such as `sarosi_force`, already
+    contains part of it.
 
     Args:
         contraction: shortening x from the resting length (m).
@@ -43,9 +43,9 @@ def stretch_force(contraction, p):
     Returns:
         Force (N), not negative; positive shortens the muscle.
     Source:
-        Our quartic through 96, 229, 416 and 684 N at 1, 2, 3 and 4 %, figures for a muscle of this
-        kind without pressure that Serres 2008 does not print: an assumption. All its terms are
-        positive, so the force rises ever more steeply.
+        Our quartic through 96, 229, 416 and 684 N at 1, 2, 3 and 4 %, figures for an
+        unpressurised muscle of this kind. Serres 2008 does not print them: an assumption. All terms
+        are positive, so the force rises ever more steeply.
     """
     percent = positive(-contraction) * (100.0 / p.resting_length)
     first, second, third, fourth = TERMS
@@ -54,13 +54,13 @@ def stretch_force(contraction, p):
 
 
 def slackness(contraction, p):
-    """How far the material is from being stretched; the force has a kink at 0.
+    """Distance of the material from being stretched; the force has a kink at 0.
 
     Args:
         contraction: shortening x from the resting length (m).
         p: PassiveStretch.
     Returns:
-        Way (m), negative while it is stretched; never negative for a factor of 0: no kink.
+        Distance (m), negative while stretched; never negative for a factor of 0, so without a kink.
     """
     return where(p.factor * contraction < 0.0, contraction, abs(contraction))
 

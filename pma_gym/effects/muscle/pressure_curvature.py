@@ -1,4 +1,4 @@
-"""What a force law linear in pressure leaves out: a passive spring, and curvature in pressure."""
+"""Corrections of a force law linear in pressure: a passive spring, and curvature in pressure."""
 
 from typing import Annotated, NamedTuple
 
@@ -20,7 +20,7 @@ class PressureCurvature(NamedTuple):
 
 
 def pressure_curvature(pressure, contraction, p):
-    """Force on top of a law that is linear in pressure.
+    """Force in addition to a law that is linear in pressure.
 
         F = -passive k - softening P^2 k + offset P^2,   k = x / L0
 
@@ -32,8 +32,8 @@ def pressure_curvature(pressure, contraction, p):
     Returns:
         Force (N); positive shortens the muscle.
     Source:
-        Ours: the terms that table I3 of Serres 2008 asks for when pressures are left out of the
-        fit of Sarosi's form (`sarosi_force`) one by one.
+        Ours: the terms that table I3 of Serres 2008 supports when each pressure in turn is left
+        out of the fit of Sarosi's form (`sarosi_force`).
     """
     share = contraction / p.resting_length
     square = pressure * pressure

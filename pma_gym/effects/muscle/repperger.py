@@ -1,7 +1,7 @@
 """Repperger's muscle: a spring that depends on position and a damper that depends on velocity.
 
-Both stand in parallel with `contractile_force`, as in the three-element model whose elements they
-generalise.
+Both act in parallel with `contractile_force`. They generalise the elements of the three-element
+model.
 """
 
 from typing import Annotated, NamedTuple
@@ -34,9 +34,9 @@ def repperger_spring(pressure, contraction, p):
 
         F = -K x,   K = stiffness + linear x + quadratic x^2 + stiffening P
 
-    Departure: Serres 2008 says that K is a function of position and prints no formula, and the
-    source was not open to us; the second degree is our choice. The source's K has no pressure in
-    it: that is stiffening at 0. The term is that of its successor [2].
+    Departure: Serres 2008 states that K is a function of position but prints no formula, and we had
+    no access to the source; the second degree is our choice. The source's K does not depend on
+    pressure (stiffening = 0); that term comes from its successor [2].
 
     Args:
         pressure: gauge pressure P (Pa).
@@ -87,12 +87,12 @@ def repperger_damping(pressure, velocity, p):
 
         B = max(0, viscous + stiffening P + speed_slope x')
 
-    The velocity counts with its sign, so that a contracting muscle is damped more than a relaxing
-    one, as filling differs from venting.
+    The velocity has its sign, so that a contracting muscle is damped more than a relaxing one, as
+    filling differs from venting.
 
-    Departure: Serres 2008 says that B is a function of velocity and prints no formula, and the
-    source was not open to us; the line is our choice, beyond which Serres 2008, table I2 says
-    nothing. The pressure is that of [2].
+    Departure: Serres 2008 states that B is a function of velocity but prints no formula, and we had
+    no access to the source. The straight line is our choice; Serres 2008, table I2, supports no
+    further term. The dependence on pressure comes from [2].
 
     Args:
         pressure: gauge pressure P (Pa).
@@ -103,8 +103,8 @@ def repperger_damping(pressure, velocity, p):
     Source:
         1. D. W. Repperger, K. R. Johnson and C. A. Phillips 1998; Serres 2008, 1.2.2.3.
         2. D. B. Reynolds and others 2003.
-        3. Fitted to both damping columns of Serres 2008, table I2, whose speeds were not measured
-           but taken as half of K x / B, where each step begins: 0.69 N s/mm rms.
+        3. Fitted to both damping columns of Serres 2008, table I2: 0.69 N s/mm rms. The speeds
+           were not measured; we assume half of K x / B at the start of each step.
     """
     return positive(p.viscous + p.stiffening * pressure + p.speed_slope * velocity)
 

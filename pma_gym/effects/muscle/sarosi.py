@@ -27,7 +27,7 @@ class SarosiForce(NamedTuple):
 
 
 def sarosi_force(pressure, contraction, p):
-    """Force of the muscle: a line in contraction and pressure, and a toe near the resting length.
+    """Force of the muscle: linear in contraction and pressure, with a toe near the resting length.
 
         F = (toe_slope P + toe_force) exp(-steepness k) - softening P k + slope P + offset
         k = x / L0

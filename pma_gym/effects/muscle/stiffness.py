@@ -1,4 +1,4 @@
-"""The spring of the three-element model: linear in contraction, stiffness driven by pressure."""
+"""The spring of the three-element model: linear in contraction; pressure sets its stiffness."""
 
 from typing import Annotated, NamedTuple
 
@@ -35,7 +35,7 @@ def spring_stiffness(pressure, p):
     Returns:
         Stiffness (N/m).
     Source:
-        Serres 2008, table 2; a secant over the whole contraction, fitted at 150-550 kPa.
+        Serres 2008, table 2; a secant stiffness over the whole contraction, fitted at 150-550 kPa.
     """
     low = p.low_intercept + p.low_slope * pressure
     high = p.high_intercept + p.high_slope * pressure

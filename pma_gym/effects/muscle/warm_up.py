@@ -1,4 +1,4 @@
-"""A rested muscle contracts further: an extra force that is worked off from trial to trial."""
+"""Warm-up: a rested muscle has an extra force, which decays from trial to trial."""
 
 from typing import Annotated, NamedTuple
 
@@ -9,7 +9,7 @@ from pma_gym.units import Quantity
 _I3 = "Serres 2008, table I3, no-load contraction of the repeats, by the station's stiffness"
 
 SPENT = 12.0
-"""Decay constants after which an exponential counts as ended: 6e-6 is left."""
+"""Number of decay constants after which an exponential counts as decayed: 6e-6 remains."""
 
 
 class WarmUp(NamedTuple):
@@ -31,16 +31,16 @@ class WarmUp(NamedTuple):
 
 
 def rested_force(pressure, p):
-    """Force that a rested muscle has more than one that has been worked.
+    """Extra force of a rested muscle over a warmed-up one.
 
         F = force exp(-P / fade) exp(-repeat / repeats)
 
-    Within a trial it stays as it is: the exponent counts whole trials.
+    It is constant within a trial: the exponent counts whole trials.
 
     Args:
         pressure: gauge pressure P (Pa).
-        p: WarmUp: force at no pressure (N), fade (Pa), repeats, after which 1/e is left, and
-            repeat, how many trials the muscle has made since it rested.
+        p: WarmUp: force at zero pressure (N), fade (Pa), repeats, after which 1/e remains, and
+            repeat, the number of trials since the muscle rested.
     Returns:
         Force (N); positive shortens the muscle.
     Source:

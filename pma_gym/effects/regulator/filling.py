@@ -1,4 +1,4 @@
-"""Pressure that rises as the motor pulls: the volume shrinks faster than the regulator vents."""
+"""Pressure change by the muscle's volume, which can shrink faster than the regulator vents."""
 
 from typing import Annotated, NamedTuple
 
@@ -8,10 +8,10 @@ from pma_gym.effects.muscle.geometric_force import PI
 from pma_gym.units import Quantity
 
 ATMOSPHERE = 101325.0
-"""Pressure (Pa) that gauge pressure counts from."""
+"""Atmospheric pressure (Pa), the zero of gauge pressure."""
 
 NARROWEST = 1e-4
-"""Share of the thread's length squared that the braid keeps in width when pulled straight."""
+"""Least width of the braid when pulled straight, as a share of the thread's length squared."""
 
 
 class Filling(NamedTuple):
@@ -55,12 +55,12 @@ def braid_volume(contraction, p):
 
 
 def filling_rate(pressure, contraction, velocity, p):
-    """Rate of the pressure from the change of volume alone, beside the regulator's.
+    """Rate of pressure from the change of volume, in addition to the regulator's rate.
 
         P' = -exponent (P + P_atmosphere) V' / V,   V'/V = x' (3 L^2 - b^2) / (L (b^2 - L^2))
 
-    V is that of `braid_volume`; it grows with contraction up to the angle of 54.7 deg. The end
-    caps' volume and the hose, which soften it, are left out.
+    V is that of `braid_volume`; it grows with contraction up to the angle of 54.7 deg. The
+    volumes of the end caps and the hose, which reduce the rate, are neglected.
 
     Args:
         pressure: gauge pressure P (Pa).

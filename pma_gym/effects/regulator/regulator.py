@@ -1,4 +1,4 @@
-"""The proportional pressure regulator: its static line and its lag."""
+"""The proportional pressure regulator: its static characteristic and its lag."""
 
 from typing import Annotated, NamedTuple
 
@@ -26,7 +26,7 @@ class RegulatorLag(NamedTuple):
 
 
 def commanded_pressure(regulator_voltage, p):
-    """Pressure that the regulator settles at, never below zero.
+    """Steady pressure of the regulator at a voltage, never below zero.
 
         P_command = max(0, gain V + offset)
 
@@ -45,7 +45,7 @@ def regulator_rate(pressure_command, regulator_pace, p):
     """Rate of the pressure: tau P' = (P_command - P) pace.
 
     Args:
-        pressure_command: gauge pressure asked for (Pa).
+        pressure_command: commanded gauge pressure (Pa).
         regulator_pace: factor on the rate, 1 unless an effect changes it.
         p: RegulatorLag: time_constant tau (s).
     Returns:

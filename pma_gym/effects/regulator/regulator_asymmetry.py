@@ -1,4 +1,4 @@
-"""The regulator vents at another pace than it fills."""
+"""Asymmetry of the regulator: venting and filling have different time constants."""
 
 from typing import Annotated, NamedTuple
 
@@ -28,12 +28,12 @@ def regulator_asymmetry(pressure, pressure_command, p):
 
     Args:
         pressure: gauge pressure (Pa).
-        pressure_command: gauge pressure asked for (Pa).
+        pressure_command: commanded gauge pressure (Pa).
         p: RegulatorAsymmetry: vent_ratio, time constant of venting over that of filling.
     Returns:
         Factor.
     Source:
-        Serres 2008, section 6.1 says that filling and venting differ.
+        Serres 2008, section 6.1, reports that filling and venting differ.
     """
     return where(pressure_command < pressure, 1.0 / p.vent_ratio, 1.0)
 

@@ -1,4 +1,4 @@
-"""The regulator leaves small errors of the pressure alone."""
+"""Deadband of the regulator: it does not correct small pressure errors."""
 
 from typing import Annotated, NamedTuple
 
@@ -17,21 +17,21 @@ class RegulatorDeadband(NamedTuple):
 
 
 def deadband(pressure, pressure_command, p):
-    """Factor on the regulator's rate that ends it short of the command.
+    """Factor on the regulator's rate that stops the pressure short of the command.
 
         factor = max(0, 1 - width / |P_command - P|)
 
-    so that the pressure comes to rest by the width below the command from below, above it from
-    above. A trial begins at the command itself.
+    so that the pressure comes to rest one width below the command when it rises, and one width
+    above when it falls. A trial begins at the command.
 
     Args:
         pressure: gauge pressure P (Pa).
-        pressure_command: gauge pressure asked for (Pa).
+        pressure_command: commanded gauge pressure (Pa).
         p: RegulatorDeadband: width (Pa), to one side.
     Returns:
         Factor, 0 to 1.
     Source:
-        Our form: beyond the deadband the valve opens in proportion.
+        Our form: beyond the deadband the valve opens in proportion to the error.
     """
     error = abs(pressure_command - pressure)
     beyond = error > p.width

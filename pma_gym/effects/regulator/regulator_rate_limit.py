@@ -1,4 +1,4 @@
-"""The regulator's valve passes only so much air: pressure changes no faster than that."""
+"""Rate limit of the regulator: its valve passes a limited flow of air."""
 
 from typing import Annotated, NamedTuple
 
@@ -7,7 +7,7 @@ from pma_gym.effects.effect import Effect
 from pma_gym.units import Quantity
 
 BOUNDLESS_KPA_PER_S = 1e9
-"""Faster than any regulator within its bounds (10.2 MPa of error in 0.1 ms: 1e8)."""
+"""Faster than any regulator within its bounds (an error of 10.2 MPa in 0.1 ms is 1e8 kPa/s)."""
 
 
 class RegulatorRateLimit(NamedTuple):
@@ -27,22 +27,22 @@ class RegulatorRateLimit(NamedTuple):
 
 
 def rate_limit(pressure, pressure_command, regulator_time_constant, p):
-    """Factor on the regulator's rate that holds it to a limit.
+    """Factor that limits the regulator's rate.
 
         factor = min(1, limit tau / |P_command - P|)
 
-    Another pace (`regulator_asymmetry`) multiplies the limit too.
+    A different rate for venting (`regulator_asymmetry`) multiplies the limit too.
 
     Args:
         pressure: gauge pressure P (Pa).
-        pressure_command: gauge pressure asked for (Pa).
+        pressure_command: commanded gauge pressure (Pa).
         regulator_time_constant: tau of the regulator's lag (s).
         p: RegulatorRateLimit: limit (Pa/s).
     Returns:
         Factor.
     Source:
-        Choked flow through a valve that is fully open (ISO 6358) does not depend on how much more
-        is asked for; the limit is taken as constant.
+        Choked flow through a valve that is fully open (ISO 6358) does not depend on the
+        size of the error; we take the limit as constant.
     """
     error, most = abs(pressure_command - pressure), p.limit * regulator_time_constant
     return where(error > most, most / where(error > most, error, most), 1.0)

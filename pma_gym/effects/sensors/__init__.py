@@ -1,1 +1,1 @@
-"""The sensors: lag, noise, gain and offset, play."""
+"""The sensors: lag, noise, gain and offset errors, backlash."""

@@ -1,4 +1,4 @@
-"""Play between the pulley and its potentiometer."""
+"""Backlash (play) between the pulley and its potentiometer."""
 
 from typing import Annotated, NamedTuple
 
@@ -16,15 +16,15 @@ class PotentiometerBacklash(NamedTuple):
 
 
 def play(memory, p):
-    """What the play takes from the angle that the potentiometer reads.
+    """Error of the measured angle by the play.
 
         error = -width / 2 z
 
     Args:
-        memory: place z in the play, -1 at one stop to 1 at the other.
+        memory: position z in the play, -1 at one stop to 1 at the other.
         p: PotentiometerBacklash: width (rad), from stop to stop.
     Returns:
-        Error (rad), added to the truth.
+        Error (rad), added to the true value.
     Source:
         Stop operator, rounded as by Bouc and Wen (Y. K. Wen 1976).
     """
@@ -32,17 +32,17 @@ def play(memory, p):
 
 
 def play_rate(spin, memory, p):
-    """Rate of the place in the play.
+    """Rate of the position in the play.
 
         z' = 2 theta' / width (1 - |z|^4)   towards a stop
         z' = 2 theta' / width               away from it
 
-    After a turn the reading stands still over the width, then follows within a quarter of it; it
-    never runs backwards. At a width of 0 z stays exactly 0.
+    After a reversal the measurement stays constant over the width, then follows within a quarter of
+    the width; it never moves backwards. At a width of 0 z stays exactly 0.
 
     Args:
         spin: rate of the pulley's angle theta' (rad/s).
-        memory: place z.
+        memory: position z.
         p: PotentiometerBacklash.
     Returns:
         (source, decay) with z' = source - decay * z (1/s).
@@ -53,13 +53,13 @@ def play_rate(spin, memory, p):
 
 
 def play_turn(spin, p):
-    """Where the pulley turns, the place in the play goes another way.
+    """Event function: the play's law changes form where the pulley reverses.
 
     Args:
         spin: rate of the pulley's angle (rad/s).
         p: PotentiometerBacklash.
     Returns:
-        The same (rad/s); 1 where there is no play.
+        The rate (rad/s); 1 where there is no play.
     """
     there = where(p.width > 0.0, 1.0, 0.0)
     return there * spin + (1.0 - there)

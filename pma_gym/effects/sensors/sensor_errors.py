@@ -1,8 +1,8 @@
-"""Sensors that read wrong: a gain and an offset each, before their lag.
+"""Calibration errors of sensors: a gain error and an offset each, before the sensor's lag.
 
-A sensor has them only together with its own table (`lvdt`, `load_cell`, ...), whose lag they enter.
-The zeros of contraction and rotation are free in every trial, so those two offsets show only
-where a sensor's zero is not taken anew.
+A model can have them only together with the sensor's table (`lvdt`, `load_cell`, ...), whose lag
+filters them. The zeros of contraction and rotation are free parameters of every trial, so those two
+offsets are visible only where a sensor is not zeroed for each trial.
 """
 
 from typing import Annotated, NamedTuple
@@ -52,24 +52,24 @@ class PotentiometerError(NamedTuple):
 
 
 class ForceSensorError(NamedTuple):
-    """Error of the force that a drive measures which imposes a motion."""
+    """Error of the force measured at a drive that imposes a motion."""
 
     gain: Annotated[float, _GAIN]
     offset: Annotated[float, Quantity("N", -1e5, 1e5, "assumption: 5", 0.0, usual=5)]
 
 
 def sensor_error(signal, p):
-    """What a sensor stands on beside the truth.
+    """Error of a sensor before its lag.
 
         error = gain signal + offset
 
     Args:
-        signal: the truth (SI).
+        signal: the true value (SI).
         p: the sensor's error: gain (share), offset (SI).
     Returns:
-        Error (SI), added to the truth.
+        Error (SI), added to the true value.
     Source:
-        A straight calibration line, wrong in both of its numbers.
+        A straight calibration line with errors in gain and offset.
     """
     return p.gain * signal + p.offset
 

@@ -1,4 +1,4 @@
-"""The four sensors: first-order lag, calibration line, noise; one law, four sets of parameters."""
+"""Sensors with first-order lag, calibration line and noise: one law, one set of parameters each."""
 
 from typing import Annotated, NamedTuple
 
@@ -81,7 +81,7 @@ class Tachometer(NamedTuple):
 
 
 class ForceSensor(NamedTuple):
-    """Force on a drive that imposes a motion."""
+    """Force at a drive that imposes a motion."""
 
     bandwidth: Annotated[float, _bandwidth(1000)]
     noise: Annotated[
@@ -93,7 +93,7 @@ def sensor_rate(signal, p):
     """Rate of a sensor's output before noise: s' = (signal - s) / tau, tau = 1 / (2 pi f).
 
     Args:
-        signal: what the sensor stands on (SI).
+        signal: input of the sensor (SI).
         p: the sensor's parameters; bandwidth f (Hz, -3 dB).
     Returns:
         (source, decay) with s' = source - decay * s.
@@ -125,7 +125,7 @@ TACHOMETER = _sensor("tachometer", "velocity", Tachometer)
 FORCE_SENSOR = _sensor("force_sensor", "force", ForceSensor)
 
 JOINT_SENSORS: tuple[Effect, ...] = (ENCODER, GYROSCOPE)
-"""Sensors of a joint, as the catalogue has them."""
+"""Sensors of a joint, as effects of the catalogue."""
 
 SENSORS: tuple[Effect, ...] = (LVDT, LOAD_CELL, PRESSURE_TRANSDUCER, POTENTIOMETER)
-"""All sensors, as the catalogue has them."""
+"""All sensors, as effects of the catalogue."""

@@ -1,1 +1,1 @@
-"""The slide: its mass, its friction, the hand at it, and where a free one starts."""
+"""The slide: its mass, its friction, a hand that pushes it, and the initial state if it is free."""

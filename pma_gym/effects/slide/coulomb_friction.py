@@ -11,8 +11,8 @@ BREAKAWAY_SHARE = 0.7
 
 
 STRIBECK_SPEEDS = 3.0
-"""Speed, in Stribeck speeds, at which a step ends: the force's fall is too short to be seen from
-beyond."""
+"""Speed, in Stribeck speeds, at which a step ends: a larger step would miss the short drop of the
+force."""
 
 
 class CoulombFriction(NamedTuple):
@@ -49,13 +49,13 @@ def friction_force(velocity, memory, p):
 
 
 def friction_path(memory, travel, direction, p):
-    """Deflection of the bristles after the slide has travelled on without turning.
+    """Deflection of the bristles after a travel of the slide without a reversal.
 
-    Under 0.7 of the full deflection the bristles are elastic, so the slide is stuck: z grows by
-    travel / presliding, forwards and back on the same line. Above, they begin to slip: z bends over
-    as a parabola of the travel and reaches 1 after 1.3 presliding distances, whatever the speed. A
-    constant load under static holds for ever, and so does one that swings under 0.7 static; one
-    that swings above it creeps a little at each swing.
+    Below 0.7 of the full deflection the bristles are elastic and the slide sticks: z changes by
+    travel / presliding, on the same line in both directions. Above, the bristles begin to slip: z
+    is a parabola of the travel and reaches 1 after 1.3 presliding distances, at every speed. A
+    constant load below static holds for ever, and so does an oscillating load below 0.7 static. A
+    larger oscillating load makes the slide creep a little in each period.
 
     Args:
         memory: z where the travel began.
@@ -78,20 +78,20 @@ def friction_path(memory, travel, direction, p):
 
 
 def friction_breakpoint(memory, direction, p):
-    """Way to where the deflection begins to bend over, or, from there, to where all bristles slip.
+    """Distance to the point where bristles begin to slip, or, from there, where all of them slip.
 
     Args:
         memory: z where the travel begins.
         direction: 1 where the slide moves in the direction of contraction, else -1.
         p: CoulombFriction.
     Returns:
-        Way (m), 0 where all slip or nothing rubs.
+        Distance (m), 0 where all bristles slip or there is no friction.
     """
     return where(p.static + p.dynamic > 0.0, p.presliding, 0.0) * elastic_way(memory, direction)
 
 
 def elastic_way(memory, direction):
-    """Way, in preslidings, to where the deflection bends over or, from there, to where all slip.
+    """Distance to where bristles begin to slip, or from there to full slip, in presliding lengths.
 
     Args:
         memory: z where the travel begins.
@@ -103,26 +103,26 @@ def elastic_way(memory, direction):
 
 
 def release_path(memory, direction, p):
-    """Way that a turn takes until the bristles are relaxed: they are elastic on their way back.
+    """Distance after a reversal until the bristles are relaxed; they return elastically.
 
     Args:
         memory: deflection z where the travel begins.
         direction: 1 where the motion is in the direction of contraction, else -1.
         p: parameters with presliding (m).
     Returns:
-        Way (m); 0 where the motion deflects them further.
+        Distance (m); 0 where the motion deflects them further.
     """
     return p.presliding * positive(-direction * memory)
 
 
 def stribeck_breakpoint(velocity, p):
-    """Speed beyond that at which nine tenths of what static exceeds dynamic are gone.
+    """Speed in excess of the speed at which the Stribeck effect has dropped by nine tenths.
 
     Args:
         velocity: rate of contraction (m/s).
         p: CoulombFriction.
     Returns:
-        Speed (m/s), negative while the force still falls; 1 where it does not fall.
+        Speed (m/s), negative where the force still falls with speed; 1 where it does not fall.
     """
     above = abs(velocity) - STRIBECK_SPEEDS * p.stribeck_speed
     falls = where(p.static > p.dynamic, 1.0, 0.0)

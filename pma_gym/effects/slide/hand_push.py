@@ -1,4 +1,4 @@
-"""Somebody who pulls or pushes at the slide, beside muscle and cable."""
+"""A hand that pulls or pushes the slide, in addition to muscle and cable."""
 
 from typing import Annotated, NamedTuple
 
@@ -22,11 +22,11 @@ def hand_push_force(memory, p):
 
         F = share * f
 
-    It adds to the muscle's force at the slide, where a load is carried, so that the cable and its
-    load cell feel it only as far as the slide moves.
+    It adds to the muscle's force at the slide. It reaches the cable and the load cell only through
+    the motion of the slide.
 
     Args:
-        memory: the hand's force f (N), written from outside as a command is.
+        memory: the hand's force f (N), set from outside like a command.
         p: HandPush: share.
     Returns:
         Force (N); positive shortens the muscle.
@@ -37,7 +37,7 @@ def hand_push_force(memory, p):
 
 
 def hand_push_rate(memory, p):
-    """Rate of the hand's force: none, it stays as it was written.
+    """Rate of the hand's force: zero, because it is set from outside.
 
     Args:
         memory: the hand's force (N).

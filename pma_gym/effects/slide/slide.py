@@ -7,7 +7,7 @@ from pma_gym.units import Quantity
 
 
 class Slide(NamedTuple):
-    """Moving mass; the plant reads it itself."""
+    """Moving mass; the plant reads it directly."""
 
     mass: Annotated[float, Quantity("kg", 1e-3, 1000, "assumption: 0.5", usual=0.5)]
 

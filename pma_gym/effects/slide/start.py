@@ -1,4 +1,4 @@
-"""Where and how fast a slide that nothing holds is when a trial begins."""
+"""Initial position and speed of a free slide."""
 
 from typing import Annotated, NamedTuple
 
@@ -7,7 +7,7 @@ from pma_gym.units import Quantity
 
 
 class Start(NamedTuple):
-    """State of a free slide at the beginning; the plant reads it itself."""
+    """Initial state of a free slide; the plant reads it directly."""
 
     contraction: Annotated[
         float, Quantity("mm", -1e5, 1e5, "each trial's own: its first readings", 0.0, usual=10)

@@ -185,7 +185,7 @@ class Writer(ResetWriter):
     ) -> None:
         real, paired = "float" if self.kernel.single else "double", pairs(self.width)
         simd = SimdEmitter(self.width, real, FUSED, paired)
-        sums = [f"sum_{phase.name}" for phase in self.state_layout.task.protocol.phases]
+        sums = [f"sum_{phase.name}" for phase in self.state_layout.task.schedule.phases]
         lane = Lane(b, simd, self.layout, ["clock", "sample", *sums])
         period = self.state_layout.options.period
         following, behind = (variable(b, INTEGER, job) for job in self._jobs(b, given))
@@ -270,7 +270,7 @@ class Writer(ResetWriter):
         known[graph.input("length", 2).id] = emitted[self.attempt.length.id]
         known[graph.input("accepted", 2, "truth").id] = emitted[self.attempt.accepted.id]
         known[graph.input("clock", HELD).id] = lane.vector("clock")
-        phases = task.protocol.phases
+        phases = task.schedule.phases
         with repeat(b) as leave_if:
             for name in ("sample", *(f"sum_{phase.name}" for phase in phases)):
                 known[graph.input(f"record.{name}", 2).id] = lane.vector(name)

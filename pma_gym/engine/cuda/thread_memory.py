@@ -70,7 +70,7 @@ class ThreadMemory(Writer):
     @property
     def sums(self) -> list[str]:
         """Places of the sums of squared errors, one a phase."""
-        return [f"sum_{phase.name}" for phase in self.state_layout.task.protocol.phases]
+        return [f"sum_{phase.name}" for phase in self.state_layout.task.schedule.phases]
 
     def _write(self) -> None:
         self._table()

@@ -1,1 +1,1 @@
-"""Pictures of the station at work."""
+"""Pictures of the station during an episode."""

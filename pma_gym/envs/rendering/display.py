@@ -1,4 +1,4 @@
-"""Where pictures of an environment are drawn and shown: in arrays, and in a window on demand."""
+"""Display of an environment's pictures, as arrays or in a window."""
 
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, Protocol
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 class Pictured(Protocol):
-    """An environment that has pictures."""
+    """Interface of an environment with pictures."""
 
     @property
     def time(self) -> float:
@@ -24,16 +24,16 @@ class Pictured(Protocol):
         ...
 
     def picture(self) -> NDArray[np.uint8]:
-        """The picture now, RGB of shape (height, width, 3)."""
+        """The present picture, RGB of shape (height, width, 3)."""
         ...
 
 
 class Display:
-    """Draws pictures of a task's environments; with a window, shows them at the simulated pace.
+    """Draw pictures of a task's environments, and show them in a window at simulated time.
 
     Args:
         task: the task.
-        width: of the pictures (pixels); they are half as high.
+        width: width of the pictures (pixels); they are half as high.
         windowed: whether there is a window.
     Raises:
         gymnasium.error.DependencyNotInstalled: a window without pygame.
@@ -46,7 +46,7 @@ class Display:
 
     @property
     def has_window(self) -> bool:
-        """Whether it has a window, open or closed."""
+        """Whether the display has a window, open or closed."""
         return self._window is not None
 
     @property
@@ -55,7 +55,7 @@ class Display:
         return self._window is not None and self._window.closed
 
     def draw(self, scene: Scene, history: History) -> NDArray[np.uint8]:
-        """The picture of an environment now, see `Picture.draw`."""
+        """Return the present picture of an environment, see `Picture.draw`."""
         if self._picture is None:
             # Imported here: an environment without pictures needs no matplotlib.
             from pma_gym.envs.rendering.picture import Picture
@@ -64,7 +64,7 @@ class Display:
         return self._picture.draw(scene, history)
 
     def show(self, environment: Pictured) -> None:
-        """Draw in the window, if there is one, once the clock has come to the simulated time."""
+        """Draw in the window, if there is one, after a wait for the simulated time."""
         if self._window is None:
             return
         self._window.wait(environment.time)
@@ -72,18 +72,18 @@ class Display:
             self._window.show(environment.picture())
 
     def begin(self, environment: Pictured) -> None:
-        """Show how an episode begins, and let the pace begin with it."""
+        """Show the start of an episode, and start the clock."""
         self.show(environment)
         if self._window is not None:
             # Drawing for the first time takes a while.
             self._window.start()
 
     def shown(self, step: Callable[[Any], Any], environment: Pictured) -> Callable[[Any], Any]:
-        """A step that the window shows, but for the one that ends an episode.
+        """Show a step in the window, except the one that ends an episode, and return it.
 
         Args:
-            step: as `Engine.advance` has it: a tuple, or a code where there is no plain result.
-            environment: whose step it is.
+            step: as `Engine.advance` returns it: a tuple, or a code without a regular result.
+            environment: the environment of the step.
         """
         window = self._window
         assert window is not None

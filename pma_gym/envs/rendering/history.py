@@ -1,4 +1,4 @@
-"""An engine that keeps what the pictures of a batch draw: positions and voltages by step."""
+"""An engine that records positions and voltages per step, for the pictures of a batch."""
 
 from typing import Any, NamedTuple
 
@@ -10,11 +10,11 @@ from pma_gym.units import SI_FACTORS
 
 
 class History(NamedTuple):
-    """The course of an episode so far.
+    """Recorded course of an episode.
 
     Attributes:
         time: times of the positions since the trial began (s), shape (k,).
-        position: true positions that the task asks for (m, rad or N m), shape (k,).
+        position: true positions of the controlled quantity (m, rad or N m), shape (k,).
         voltages: voltage of the task's actuator in every control step (V), shape (steps,).
     """
 
@@ -24,19 +24,19 @@ class History(NamedTuple):
 
 
 class RecordingEngine(Engine):
-    """An `Engine` that writes down position and voltage of every environment at every step.
+    """An `Engine` that records position and voltage of every environment at every step.
 
-    Only a batch that renders has one: the step of any other batch does nothing for it.
+    Only a batch that renders uses it; other batches have no extra cost.
 
     Args:
         arguments: as `Engine`.
     """
 
     def __init__(self, *arguments: Any) -> None:
-        """Compile, and make room for whole episodes."""
+        """Compile, and allocate arrays for whole episodes."""
         super().__init__(*arguments)
-        protocol = self.task.protocol
-        self._shown = f"{protocol.quantity}_{protocol.suffix}", SI_FACTORS[protocol.unit]
+        schedule = self.task.schedule
+        self._shown = f"{schedule.quantity}_{schedule.suffix}", SI_FACTORS[schedule.unit]
         # A batch may step an episode that has ended once more.
         steps = self.task.steps(self.options.control_rate_hz) + 2
         self._every = np.arange(self.count)
@@ -44,7 +44,7 @@ class RecordingEngine(Engine):
         self._voltages = np.full((steps, self.count), np.nan)
 
     def step(self) -> int:
-        """Step, see `Engine`, and write down where each environment is."""
+        """Step as `Engine`, and record every environment."""
         self._follow()
         ended = super().step()
         counts = self._counts()
@@ -72,7 +72,7 @@ class RecordingEngine(Engine):
             self._positions[counts[moved], moved] = present[moved]
 
     def history(self, index: int) -> History:
-        """The course of an environment's episode at its control steps, NaN where unknown."""
+        """Return the course of an environment's episode at its control steps, NaN where unknown."""
         self._follow()
         count = min(self.steps(index), len(self._voltages))
         return History(

@@ -1,7 +1,7 @@
-"""A picture of the station at work: the rig on the left, the trial so far on the right.
+"""Picture of the station: the rig on the left, the trial so far on the right.
 
-The only importer of matplotlib in the environments; `PMAEnv.render` imports it when first needed.
-What never changes is drawn once; each picture restores it and draws what moves on top.
+Only this module of the environments imports matplotlib; `PMAEnv.render` imports it on first use.
+The static background is drawn once; each picture restores it and draws the moving parts on top.
 """
 
 import math
@@ -21,28 +21,28 @@ from pma_gym.tasks import Task
 from pma_gym.units import SI_FACTORS
 
 DPI = 100
-"""Pixels of an inch of a picture of the usual width: wider ones show the same, larger."""
+"""Pixels per inch at the usual width; wider pictures show the same, enlarged."""
 
 ACTUAL, VOLTAGE = "#1565c0", "#4a7c3a"
 MOST_RATE_HZ = 100.0
-"""Positions are drawn at most at about this rate: more than there are pixels."""
+"""Largest rate (Hz) of drawn positions, more than there are pixels."""
 
 
 _AXIS = {"excess": "moment's excess"}
-"""Labels of quantities that do not speak for themselves."""
+"""Axis labels of quantities whose name needs an explanation."""
 
 
 class Picture:
-    """Draws an environment again and again.
+    """Draw pictures of an environment, one per call.
 
     Args:
-        task: the task, which says what the plot's axes are.
+        task: the task, which defines the axes of the plot.
         width: width of the picture (pixels); it is half as high.
     """
 
     def __init__(self, task: Task, width: int = USUAL_WIDTH) -> None:
-        """Draw what never changes."""
-        self._factor = SI_FACTORS[task.protocol.unit]
+        """Draw the static background."""
+        self._factor = SI_FACTORS[task.schedule.unit]
         self._figure = Figure(
             figsize=(USUAL_WIDTH / DPI, 0.5 * USUAL_WIDTH / DPI),
             dpi=DPI * width / USUAL_WIDTH,
@@ -59,7 +59,7 @@ class Picture:
         self._still = self._canvas.copy_from_bbox(self._figure.bbox)
 
     def draw(self, scene: Scene, history: History) -> NDArray[np.uint8]:
-        """The picture now.
+        """Return the present picture.
 
         Args:
             scene: an environment of the task, in or after an episode.
@@ -79,24 +79,24 @@ class Picture:
         return np.asarray(self._canvas.buffer_rgba())[..., :3].copy()
 
     def _add_position_plot(self, task: Task) -> None:
-        protocol = task.protocol
+        schedule = task.schedule
         axes = self._plot((0.545, 0.46, 0.435, 0.44), task)
-        time = np.linspace(0.0, protocol.duration, 301)
+        time = np.linspace(0.0, schedule.duration, 301)
         axes.plot(
             time,
-            protocol.reference(time) / self._factor,
+            schedule.reference(time) / self._factor,
             "--",
             color=REFERENCE,
             lw=1.4,
-            label="prescribed" if protocol.followed.is_force else "reference",
+            label="prescribed" if schedule.followed.is_force else "reference",
         )
-        (self._actual,) = axes.plot([], [], color=ACTUAL, lw=1.8, label=f"true {protocol.quantity}")
+        (self._actual,) = axes.plot([], [], color=ACTUAL, lw=1.8, label=f"true {schedule.quantity}")
         (self._now,) = axes.plot([], [], "o", color=ACTUAL, ms=5)
         # An excess lies on either side of what is prescribed.
-        lowest, highest = (-1.2, 2.4) if protocol.followed.is_force else (-0.12, 1.2)
-        span = protocol.span / self._factor
+        lowest, highest = (-1.2, 2.4) if schedule.followed.is_force else (-0.12, 1.2)
+        span = schedule.span / self._factor
         axes.set_ylim(lowest * span, highest * span)
-        axes.set_ylabel(f"{_AXIS.get(protocol.quantity, protocol.quantity)} ({protocol.unit})")
+        axes.set_ylabel(f"{_AXIS.get(schedule.quantity, schedule.quantity)} ({schedule.unit})")
         axes.tick_params(labelbottom=False)
         axes.legend(
             loc="lower right",
@@ -120,7 +120,7 @@ class Picture:
 
     def _plot(self, place: tuple[float, float, float, float], task: Task) -> Axes:
         axes = self._figure.add_axes(place)
-        axes.set_xlim(0.0, 1.01 * task.protocol.duration)
+        axes.set_xlim(0.0, 1.01 * task.schedule.duration)
         axes.spines[["top", "right"]].set_visible(False)
         axes.spines[["left", "bottom"]].set_color(FAINT)
         axes.tick_params(labelsize=8, color=FAINT, labelcolor=INK)

@@ -1,4 +1,4 @@
-"""How large pictures are."""
+"""Size of pictures."""
 
 from numbers import Integral
 
@@ -9,12 +9,12 @@ LEAST_WIDTH, MOST_WIDTH = 400, 3200
 
 
 def check_render_width(width: object) -> int:
-    """The width of pictures, if there can be such ones.
+    """Check the width of pictures and return it.
 
-    Multiples of 4, so that the height is even too: films in H.264 need both.
+    It must be a multiple of 4, so that the height is even, as H.264 videos need.
 
     Raises:
-        ValueError: names the rule, the unit and what came.
+        ValueError: with the rule, the unit and the invalid value.
     """
     whole = isinstance(width, Integral) and not isinstance(width, bool)
     if not whole or not LEAST_WIDTH <= int(width) <= MOST_WIDTH or int(width) % 4:  # type: ignore[call-overload]

@@ -1,4 +1,4 @@
-"""The rig, drawn to scale: muscle, slide, cable and pulley, and what its gauges say."""
+"""Drawing of the rig to scale: muscle, slide, cable, pulley and measured values."""
 
 import math
 
@@ -18,18 +18,18 @@ LEG, LEG_LENGTH = "#b9775a", 2.2
 """Colour of an operator's leg on the lever, and its length in radii of the pulley: not to scale."""
 
 LENGTH, RADIUS = 250.0, 12.0
-"""The muscle at rest (mm): a MAS-20-250N, its wall included."""
+"""Size of the muscle at rest (mm): a MAS-20-250N, wall included."""
 BRAID_ANGLE = math.radians(25.0)
-"""Angle of the braid to the axis at rest; it sets how much the muscle bulges in the picture."""
+"""Angle of the braid to the axis at rest, which sets the bulge of the drawn muscle."""
 PULLEY_RADIUS, PULLEY_X, SLIDE_WIDTH = 25.4, 318.0, 16.0
 SHARE = np.linspace(0.0, 1.0, 61)
 TAPER = np.minimum(1.0, np.minimum(SHARE, 1.0 - SHARE) / 0.13)
 TAPER = TAPER * TAPER * (3.0 - 2.0 * TAPER)
-"""From the end fittings, which keep their width, to the full bulge."""
+"""Length of the transition from the end fittings, of constant width, to the full bulge."""
 
 
 def bulged_radius(contraction: float) -> float:
-    """Radius (mm) of a braided muscle that has shortened by a contraction (m).
+    """Radius (mm) of a braided muscle at a contraction (m).
 
     Its threads keep their length: length = b cos(angle), radius ~ b sin(angle).
 
@@ -41,19 +41,19 @@ def bulged_radius(contraction: float) -> float:
 
 
 class RigDrawing:
-    """The rig in axes of millimetres.
+    """Drawing of the rig in axes with millimetres.
 
     Args:
-        axes: where to draw.
+        axes: the axes to draw in.
         task: the task, whose reference is marked on the slide's rail or on the pulley.
 
     Attributes:
-        axes: where it is drawn.
+        axes: the axes of the drawing.
         moving: artists that `update` moves.
     """
 
     def __init__(self, axes: Axes, task: Task) -> None:
-        """Draw what stands still, and make what moves."""
+        """Draw the fixed parts, and create the moving ones."""
         self.axes, self._task = axes, task
         axes.set_xlim(-22.0, 361.0)
         axes.set_ylim(-240.0, 160.0)
@@ -65,7 +65,7 @@ class RigDrawing:
         self._make_gauges()
 
     def update(self, scene: Scene) -> None:
-        """Move everything to where a scene has it."""
+        """Move all parts to the positions of a scene."""
         truth = scene.truth
         end = LENGTH - 1e3 * truth["contraction"]
         self._move_muscle(end, bulged_radius(truth["contraction"]))
@@ -153,12 +153,12 @@ class RigDrawing:
         self._leg.set_data(x, y)
 
     def _move_mark(self, scene: Scene, end: float) -> None:
-        if self._task.protocol.followed.is_travel:
-            outwards = -1.0 if self._task.protocol.followed.shortens else 1.0
+        if self._task.schedule.followed.is_travel:
+            outwards = -1.0 if self._task.schedule.followed.shortens else 1.0
             x = end - 1e3 * outwards * scene.error + 0.5 * SLIDE_WIDTH
             self._mark.set_data([x, x], [-64.0, -45.0])
         else:
-            excess = self._task.protocol.followed.is_force
+            excess = self._task.schedule.followed.is_force
             reference = PACE.at(scene.time) if excess else scene.truth["rotation"] - scene.error
             radii = np.array([1.08, 1.38]) * np.exp(1j * (math.pi / 2 - reference))
             self._mark.set_data(*_on_pulley(radii, 1.0))
@@ -170,7 +170,7 @@ GAUGES = {
     "actuator": "{:.2f} V",
     "time": "{:.2f} s",
 }
-"""What the gauges show, and how."""
+"""Displayed measurements with their formats."""
 
 
 def _gauge_x(index: int) -> float:

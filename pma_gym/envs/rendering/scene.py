@@ -1,4 +1,4 @@
-"""The part of an environment that a picture reads."""
+"""Interface of an environment for pictures."""
 
 from collections.abc import Mapping
 from typing import Protocol
@@ -7,16 +7,16 @@ from pma_gym.engine.options import Options
 
 
 class Scene(Protocol):
-    """An environment in or after an episode, as far as a picture shows it.
+    """State of an environment, during or after an episode, that a picture shows.
 
     Attributes:
         options: the environment's options.
         truth: true contraction (m), rotation (rad), load (N) and pressure (Pa) by name.
-        position: true position that the task asks for (m, rad or N m).
-        error: true position less reference, in the same unit.
-        motor_voltage, regulator_voltage: commands of the last step at the station (V).
+        position: true position of the controlled quantity (m, rad or N m).
+        error: true position minus reference, in the same unit.
+        motor_voltage, regulator_voltage: commands at the station in the last step (V).
         time: time since the trial began (s).
-        ended_by: the limit that terminated the episode, in words; "" while none has.
+        ended_by: name of the limit that terminated the episode; "" if none has.
     """
 
     options: Options

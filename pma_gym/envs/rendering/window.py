@@ -1,4 +1,4 @@
-"""A window that shows pictures at the pace of the simulated time."""
+"""A window that shows pictures in real time."""
 
 import importlib
 import time
@@ -9,26 +9,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 FRAME_S = 1.0 / 30.0
-"""Shortest time between two pictures (s): a film's; drawing all of 100 a second takes a core."""
+"""Shortest time between two pictures (s), as in a film; 100 pictures a second would take a core."""
 
 LONGEST_WAIT_S = 0.05
-"""Longest sleep between two looks at the window's events (s)."""
+"""Longest sleep between two checks of the window's events (s)."""
 
 
 class Window:
-    """A window on the screen.
+    """Show pictures in a window on the screen.
 
     Args:
         title: the window's title.
     Raises:
-        gymnasium.error.DependencyNotInstalled: pygame is missing; says what installs it.
+        gymnasium.error.DependencyNotInstalled: pygame is missing; with the command to install it.
 
     Attributes:
-        closed: whether its user has closed it, by its button, Escape or q. It shows nothing then.
+        closed: whether the user has closed the window, by its button, Escape or q.
     """
 
     def __init__(self, title: str) -> None:
-        """Look for pygame; the window opens with the first picture."""
+        """Import pygame; the window opens with the first picture."""
         try:
             self._pygame = importlib.import_module("pygame")
         except ModuleNotFoundError as error:
@@ -42,11 +42,11 @@ class Window:
         self.closed = False
 
     def start(self, simulated: float = 0.0) -> None:
-        """Let the pace begin at a simulated time (s)."""
+        """Start the clock at a simulated time (s)."""
         self._started = time.perf_counter() - simulated
 
     def wait(self, simulated: float) -> bool:
-        """Wait until a simulated time (s) has come on the clock; whether a picture is due then."""
+        """Wait until a simulated time (s), and return whether a picture is due."""
         if self._started == -np.inf:
             self.start(simulated)
         while not self.closed:
@@ -83,7 +83,7 @@ class Window:
                 return
 
     def close(self) -> None:
-        """Close the window for good; twice does no harm."""
+        """Close the window; a second call has no effect."""
         self.closed = True
         if self._screen is not None:
             self._screen = None

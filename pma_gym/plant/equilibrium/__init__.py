@@ -1,1 +1,1 @@
-"""Equilibria of plants: the states that stand still at constant commands."""
+"""Equilibria of plants at constant commands."""

@@ -1,4 +1,4 @@
-"""Equilibrium of a station: contractions at which muscles balance what cables and drives ask."""
+"""Equilibrium of a station: the contraction at which the muscle balances cable and drive."""
 
 from collections.abc import Callable
 
@@ -9,15 +9,15 @@ from pma_gym.effects.effect import signals
 from pma_gym.plant.equilibrium.problem import EquilibriumProblem, SolvablePlant
 
 RIPPLE = "drive_ripple"
-"""Port whose effects make the load depend on where the motor stands."""
+"""Port whose effects make the load depend on the motor's angle."""
 
 _CLEAR_M, _NEAR_RAD, _MOST_APPROACHES = 1e-3, 1e-13, 100
-"""Slack (m) that shows a drive's load without the cable; by how much an angle may still miss, and
-how often it is tried anew."""
+"""Slack (m) at which a drive's load is known without the cable; tolerance of the angle, and largest
+number of iterations."""
 
 
 def solve_station(problem: EquilibriumProblem) -> None:
-    """Put a station's contraction and angle where muscle, cable and drive hold each other."""
+    """Solve for a station's contraction and angle at which muscle, cable and drive balance."""
     problem.zero[:] = _balance(problem, np.zeros(len(problem.state)))
     problem["contraction"] = problem.zero
     # With the zero at the contraction itself the cable is slack: the rotor shows the drive's load.
@@ -44,10 +44,9 @@ def _drive_load(problem: EquilibriumProblem) -> np.ndarray:
 
 
 def _settle_by_angle(problem: EquilibriumProblem) -> None:
-    """Bring contractions and angles to where the loads at those angles hold them.
+    """Iterate contractions and angles until the loads at the angles balance.
 
-    How far to go towards the angle that the load asks for is told by how that changed the last time
-    (Wegstein 1958). Each row stops by itself.
+    The relaxation factor follows from the last change (Wegstein 1958). Rows stop independently.
     """
     rotor = problem.parameters("rotor")
     angle, contraction = problem["angle"].copy(), problem["contraction"].copy()
@@ -111,7 +110,7 @@ def balances(
         loads: shape (n,).
         vectors: parameters of each, shape (n, numbers); the plant's own if not given.
     Returns:
-        Shape (n,); an end of the bracket of twice the limits where nothing balances.
+        Shape (n,); an end of the search range (twice the limits) where there is no balance.
     """
     pressures, loads = np.ascontiguousarray(pressures, float), np.ascontiguousarray(loads, float)
     numbers = plant.vector if vectors is None else np.ascontiguousarray(vectors, float)
@@ -157,7 +156,7 @@ def _roots(
 ) -> np.ndarray:
     """Zeros of a function that falls between two ends: regula falsi that halves what stands still.
 
-    Each row stops by itself, so that its bits do not depend on the others.
+    Each row stops independently, so that its bits do not depend on the others.
     """
     at_low, at_high = function(low), function(high)
     root, done = high, np.zeros(low.shape, bool)

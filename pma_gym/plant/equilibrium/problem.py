@@ -1,4 +1,4 @@
-"""The equilibrium problem of many plants of one structure: their states so far, and their rates."""
+"""The equilibrium problem of many plants of one structure: their present states and rates."""
 
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Protocol
@@ -17,12 +17,12 @@ class CompiledEquations(Protocol):
 
     @property
     def offsets(self) -> Mapping[str, int]:
-        """Where a vector of parameters has which number."""
+        """Position of every number in a vector of parameters."""
         ...
 
 
 class SolvablePlant(Protocol):
-    """What an equilibrium problem asks of a compiled model."""
+    """Interface of a compiled model that an equilibrium problem needs."""
 
     vector: np.ndarray
 
@@ -63,15 +63,15 @@ class SolvablePlant(Protocol):
 
 
 class EquilibriumProblem:
-    """States on their way to equilibrium; x0 is 0 until it is known.
+    """Iterated states of many plants; x0 is 0 until it is known.
 
     Attributes:
         plant: one of the plants.
-        names: places of the states by name.
-        vectors: parameters of each, shape (n, numbers); None where all have the plant's own.
+        names: index of each state by name.
+        vectors: parameters of each plant, shape (n, numbers); None for the parameters of `plant`.
         inputs: motor and regulator command (V) and x0 (m), shape (n, 3).
         state: the states (SI), shape (n, states).
-        unbalanced: why there is no equilibrium, in words; empty so far.
+        unbalanced: reason why there is no equilibrium; empty if there is one.
     """
 
     def __init__(
@@ -97,7 +97,7 @@ class EquilibriumProblem:
 
     @property
     def zero(self) -> np.ndarray:
-        """Contractions x0 (m), shape (n,), to be written to."""
+        """Contractions x0 (m), shape (n,), as a writable view."""
         return self.inputs[:, 2]
 
     def __getitem__(self, name: str) -> np.ndarray:
@@ -119,7 +119,7 @@ class EquilibriumProblem:
         return out[:, self.names[name]]
 
     def output(self, name: str) -> np.ndarray:
-        """A true output where the states stand, x0 at 0, shape (n,)."""
+        """A true output at the present states with x0 = 0, shape (n,)."""
         plant, truth = self.plant, np.empty((len(self.state), len(self.plant.outputs)))
         for i, (state, out) in enumerate(zip(self.state, truth, strict=True)):
             numbers = plant.vector if self.vectors is None else self.vectors[i]
@@ -128,9 +128,9 @@ class EquilibriumProblem:
         return truth[:, list(plant.outputs).index(name)]
 
     def relax(self, name: str, of: str = "", about: np.ndarray | float = 0.0) -> None:
-        """Put a state where a rate vanishes that is linear in it `about` a value.
+        """Set a state to the zero of a rate that is linear in it `about` a value.
 
-        The rate is its own, or that `of` another.
+        The rate is the state's own, or that `of` another state.
         """
         rates = []
         for value in (0.0, 1.0):
@@ -143,13 +143,13 @@ class EquilibriumProblem:
             self[name] -= self.rate(of or name) / slope
 
     def follow(self, name: str, rate: np.ndarray) -> None:
-        """Put a state, which rests, where it changes at a rate; its own is linear in it."""
+        """Set a state at rest to the value at which its linear rate equals `rate`."""
         still, rest = self.rate(name), self[name].copy()
         self[name] = rest + 1.0
         self[name] = rest + rate / (self.rate(name) - still)
 
     def relax_memory(self, port: str) -> None:
-        """Put the memory of the effect at a port that follows a command where it rests."""
+        """Set the state of the command-following effect at a port to its steady value."""
         for effect in self.plant.effects.values():
             if effect.port == port and effect.memories > 1:
                 self._relax_together(effect.memory_names)
@@ -176,7 +176,7 @@ class EquilibriumProblem:
         return np.stack([self.rate(name) for name in names], axis=1)
 
     def parameters(self, effect: str) -> dict[str, np.ndarray]:
-        """An effect's parameters, one each or one for all."""
+        """An effect's parameters, one per plant or one for all."""
         if effect not in self._columns:
             self._columns[effect] = effect_parameters(self.plant, self.vectors, effect)
         return self._columns[effect]
@@ -189,12 +189,12 @@ class EquilibriumProblem:
 
 
 def put_memories(plant: SolvablePlant, vectors: np.ndarray | None, state: np.ndarray) -> None:
-    """Put memories where trials begin into states, shape (n, states); the others stay as they are.
+    """Set the effects' states to their initial values; other entries stay unchanged.
 
     Args:
         plant: one of the plants.
-        vectors: parameters of each, shape (n, numbers); None where all have the plant's own.
-        state: the states, changed in place.
+        vectors: parameters of each plant, shape (n, numbers); None for the parameters of `plant`.
+        state: the states, shape (n, states), changed in place.
     """
     for effect in plant.effects.values():
         if effect.memory_start:
@@ -206,7 +206,7 @@ def put_memories(plant: SolvablePlant, vectors: np.ndarray | None, state: np.nda
 def effect_parameters(
     plant: SolvablePlant, vectors: np.ndarray | None, effect: str
 ) -> dict[str, np.ndarray]:
-    """An effect's parameters, one each or one for all."""
+    """An effect's parameters, one per plant or one for all."""
     numbers = plant.vector[None, :] if vectors is None else vectors
     fields, offsets = plant.parameters[effect]._fields, plant.program.offsets
     return {field: numbers[:, offsets[f"{effect}.{field}"]] for field in fields}

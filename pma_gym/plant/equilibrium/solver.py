@@ -1,4 +1,4 @@
-"""Solve for equilibria: the states in which plants stand still at constant commands."""
+"""Solve for the equilibria of plants at constant commands."""
 
 import numpy as np
 
@@ -12,15 +12,15 @@ from pma_gym.plant.model import Model
 def equilibrium_at(
     plant: CompiledModel, motor_voltage: float, regulator_voltage: float
 ) -> Condition:
-    """The plant's equilibrium at constant commands.
+    """Solve for the plant's equilibrium at constant commands.
 
     Args:
         plant: the plant.
         motor_voltage: motor command (V).
         regulator_voltage: regulator command (V).
     Returns:
-        Where it stands: memories as the model says that trials begin, a load that has long arrived,
-        and the contraction x0 (m) that the muscle would have with no load at this pressure.
+        The condition at rest: initial states of effects as in the model, all lags settled, and x0
+        the contraction (m) of the muscle without load at this pressure.
     Raises:
         ValueError: a voltage out of 0-10 V, or no contraction within twice the limits balances
             the load.
@@ -40,14 +40,14 @@ def equilibria_at(
     regulator_voltages: np.ndarray,
     vectors: np.ndarray | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Equilibria of many plants of one structure, as `equilibrium_at`; none depends on another.
+    """Solve for the equilibria of many plants of one structure, each independent of the others.
 
     Args:
         plant: one of them.
         motor_voltages: motor commands (V), shape (n,).
         regulator_voltages: regulator commands (V), shape (n,).
-        vectors: parameters of each (`program.vector`), shape (n, numbers); the plant's own if not
-            given.
+        vectors: parameters of each plant (`program.vector`), shape (n, numbers); those of `plant`
+            if not given.
     Returns:
         State vectors, shape (n, states), and contractions x0 (m), shape (n,); NaN where no
         contraction balances the load.
@@ -57,9 +57,10 @@ def equilibria_at(
 
 
 def hangs_by_itself(model: Model) -> bool:
-    """Whether a model at rest with a slack cable is known by its muscle's balance alone.
+    """Whether the muscle's balance determines the equilibrium with a slack cable.
 
-    It is where sensors rest at the truth, and the regulator's command has no memory.
+    This requires sensors whose steady value is the true value, and a regulator command without
+    dynamics.
     """
     effects = model.effects.values()
     sensed = any(effect.port.startswith("sensor:") and effect.law for effect in effects)
@@ -68,7 +69,7 @@ def hangs_by_itself(model: Model) -> bool:
 
 
 class NoLoadEquilibria:
-    """Stations at rest with 0 V on the motor, many at once.
+    """Solve for the equilibria of many stations with 0 V at the motor.
 
     Args:
         plant: a plant of their structure.
@@ -97,15 +98,15 @@ class NoLoadEquilibria:
     def __call__(
         self, pressures: np.ndarray, vectors: np.ndarray | None = None
     ) -> tuple[np.ndarray, np.ndarray] | None:
-        """Their states.
+        """Solve for the states at rest.
 
         Args:
             pressures: gauge pressures (Pa), shape (n,).
-            vectors: parameters of each, shape (n, numbers); the plant's own if not given.
+            vectors: parameters of each plant, shape (n, numbers); those of `plant` if not given.
         Returns:
-            State vectors, shape (n, states), and contractions x0 (m), shape (n,); None where the
-            cable does not hang slack at 0 V, a muscle finds no balance, sensors do not rest at the
-            truth, or the regulator's command has a memory: `Plant.settle` knows those.
+            State vectors, shape (n, states), and contractions x0 (m), shape (n,). None if the cable
+            is taut at 0 V, a muscle has no balance, a sensor's steady value is not the true value,
+            or the regulator's command has dynamics; use `Plant.settle` then.
         """
         if self._common is None:
             return None
@@ -145,7 +146,7 @@ def _solve(
 
 
 _STEADY = 1.0
-"""Rate (Pa/s) under which a pressure has settled."""
+"""Rate (Pa/s) below which a pressure counts as settled."""
 
 
 def _settle_pressure(problem: EquilibriumProblem) -> None:

@@ -1,1 +1,1 @@
-"""The resistive exercise device: its moments, prescriptions for it, and the knee."""
+"""The resistive exercise device: its moments, its prescriptions, and the strength of the knee."""

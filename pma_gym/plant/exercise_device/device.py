@@ -1,4 +1,4 @@
-"""The resistive exercise device at rest: the moment at the joint by angle, pressure and muscles.
+"""Static moment of the resistive exercise device as a function of angle, pressure and muscles.
 
 A lever turns a pulley of radius r by theta, 0-90 deg, and winds in the cables of n muscles. With x
 the contraction, x0 the one at theta = 0, F the force of all muscles (`plant.muscles`) and k the
@@ -8,12 +8,11 @@ stiffness of their cables:
 
 Two ways to set the cable's length:
 
-    constant pressure    x0 = x0(P), the contraction at P without a load: the dissertation's way
+    constant pressure    x0 = x0(P), the contraction at P without a load, as in the dissertation
     scheduled pressure   x0 = x0(P_rest), set once; P then follows the angle
 
-Static: hysteresis, friction, damping and weight are left out. Each muscle has a cable of its own,
-as much stiffer than the station's as the muscle is stronger: our assumption, which lets moments
-scale with n d^2.
+Hysteresis, friction, damping and weight are neglected. Each muscle has its own cable, whose
+stiffness scales with the force of the muscle: our assumption, by which moments scale with n d^2.
 
 Source:
     Serres 2008, 3.3 and 6.3; cable and pulley as `effects.cable`.
@@ -31,25 +30,25 @@ from pma_gym.units import SI_FACTORS, Quantity
 
 RADIUS = Quantity("mm", 5, 300, "Serres 2008, table I3: 25.4; model `station`: 25.89", usual=25.4)
 FULL_ANGLE = 90.0 * SI_FACTORS["deg"]
-"""From the leg hanging at 90 deg of knee flexion to the straight leg (Serres 2008, 4.3.1)."""
+"""Range of the angle, from 90 deg of knee flexion to the straight leg (Serres 2008, 4.3.1)."""
 
 _SHORTEST, _LONGEST = -0.03, 0.09
-"""Contractions (m) of the tested muscle between which a balance is sought."""
+"""Range of contractions (m) of the tested muscle in which a balance is searched."""
 
 
 class Device(NamedTuple):
-    """What a designer chooses.
+    """Design of a device.
 
     Attributes:
-        muscles: on the pulley.
-        radius: of the pulley (m).
+        muscles: the muscles on the pulley.
+        radius: radius of the pulley (m).
     """
 
     muscles: Muscles
     radius: float
 
     def __str__(self) -> str:
-        """In words, for messages: `2 muscles of 20 mm x 250 mm on 25.9 mm`."""
+        """Text for messages: `2 muscles of 20 mm x 250 mm on 25.9 mm`."""
         number, diameter, length = self.muscles
         name = "muscle" if number == 1 else "muscles"
         size = f"{1e3 * diameter:g} mm x {1e3 * length:g} mm"
@@ -57,13 +56,14 @@ class Device(NamedTuple):
 
 
 class Moments(NamedTuple):
-    """Moments at the joint; arrays of one shape.
+    """Moments at the joint, with contractions and validity; arrays of one shape.
 
     Attributes:
-        moment: against the operator (N m).
-        contraction: of the muscles from their resting length (m), negative when stretched.
-        allowed: whether the muscles stay within their resting length, beyond which table I3 has
-            few rows, and tension (scaled with the muscles) and pressure within the model's limits.
+        moment: moment against the operator (N m).
+        contraction: contraction of the muscles from their resting length (m), negative if
+            stretched.
+        allowed: whether the muscles are not stretched beyond their resting length (table I3 has few
+            rows there), and tension (scaled with the muscles) and pressure are within the limits.
     """
 
     moment: NDArray[np.float64]
@@ -72,12 +72,12 @@ class Moments(NamedTuple):
 
 
 def own_device(model: Model) -> Device:
-    """The dissertation's own muscle on the model's pulley."""
+    """The dissertation's muscle on the model's pulley."""
     return Device(TESTED, model.parameters["rotor"].radius)
 
 
 def pressure_grid(model: Model, step: float = 2.5e3) -> NDArray[np.float64]:
-    """Pressures (Pa) of the model's validity, evenly spaced by about a step (Pa)."""
+    """Evenly spaced pressures (Pa) over the model's valid range, about a step (Pa) apart."""
     ends = model.parameters["validity"]
     count = round((ends.highest - ends.lowest) / step) + 1
     return np.linspace(ends.lowest, ends.highest, count)
@@ -94,16 +94,14 @@ def resistive_moment(
     """Static moment of a device at the joint.
 
     Args:
-        model: a model of the dissertation's station, `station` by nature.
+        model: a model whose rig is the station.
         device: muscles and pulley.
         pressure: gauge pressures (Pa), any shape.
-        angle: of the pulley (rad), broadcast with the pressures.
-        rest_pressure: gauge pressure (Pa) at which the cable was set, to hang with its slack at
-            angle 0; None sets it anew at every pressure, as the dissertation did.
-        rest_moment: moment (N m) at angle 0 and the pressure of rest, for which the cable was
-            drawn in further; broadcast too. 0: it hangs slack there.
-    Returns:
-        Moments, of the broadcast shape.
+        angle: angle of the pulley (rad), broadcast with the pressures.
+        rest_pressure: gauge pressure (Pa) at which the cable length was set at angle 0; None sets
+            it anew at every pressure, as in the dissertation.
+        rest_moment: moment (N m) at angle 0 and the rest pressure, for which the cable was
+            tightened; broadcast too. At 0 the cable is slack there.
     """
     size = device.muscles.length / TESTED.length
     force = scaled_force(muscle_force(model), device.muscles)

@@ -1,4 +1,4 @@
-"""What a young adult's knee gives against the device, by angle: the yardstick of its moments."""
+"""Torque of a young adult's knee as a function of angle: the reference for a device's moments."""
 
 import math
 from typing import Any
@@ -15,7 +15,7 @@ STRENGTH, WIDTH, OPTIMUM = 0.163, 1.258, 1.133
 """Coefficients C1 (of body weight times height), C2 (1/rad), C3 (rad): men of 18-25 years."""
 
 _REACH = 0.5 * math.pi / WIDTH
-"""How far from its optimum the knee has strength at all (rad)."""
+"""Angle from the optimum at which the knee's torque is 0 (rad)."""
 
 BODY_MASS = 75.0
 """Mass of the young adult (kg): our assumption."""
@@ -25,25 +25,24 @@ BODY_HEIGHT = 1.78
 
 GRAVITY = 9.81
 DISSERTATIONS_SHARE = 0.20
-"""The station's largest moment over the knee's largest: Serres 2008, 6.3, "about 20%"."""
+"""Ratio of the station's largest moment to the knee's: Serres 2008, 6.3, "about 20%"."""
 
 
 def knee_share(angle: Any) -> Any:  # noqa: ANN401
-    """Largest voluntary isometric torque of knee extension over the angle, the greatest being 1.
+    """Largest voluntary isometric torque of knee extension at an angle, normalised to its maximum.
 
         s = max(0, cos(C2 (phi - C3))),   phi = 90 deg - angle the knee's flexion
 
-    It ends where the leg is over-extended by 7 deg: an operator cannot push the joint beyond.
+    It is 0 where the leg is over-extended by 7 deg: an operator cannot push the joint beyond.
 
     Args:
-        angle: of the device (rad), a number, an array or a traced value: 0 with the knee at 90 deg
-            of flexion, 90 deg with the leg straight.
+        angle: angle of the device (rad), a number, an array or a traced value: 0 with the knee at
+            90 deg of flexion, 90 deg with the leg straight.
     Source:
         D. E. Anderson, M. L. Madigan, M. A. Nussbaum 2007, "Maximum voluntary joint torque as a
         function of joint angle and angular velocity", Journal of Biomechanics 40, 3105-3113.
-        Its table 3, knee extension. The paper itself was not read here; the torque muscles of the
-        Rigid Body Dynamics Library (M. Millard 2016) hold the same three coefficients as that
-        table's.
+        Coefficients of its table 3, knee extension. We did not have the paper; the torque muscles
+        of the Rigid Body Dynamics Library (M. Millard 2016) contain the same three coefficients.
     """
     flexion = 90.0 * SI_FACTORS["deg"] - angle
     within = cosine(WIDTH * (flexion - OPTIMUM))
@@ -58,12 +57,12 @@ def knee_extension_torque(
 
         M = C1 m g h s(angle),   s as `knee_share`
 
-    Departure: at the device's 18 deg/s the source's law of speed would take about 6 % off.
+    Departure: we neglect speed; at the device's 18 deg/s it would reduce the torque by about 6 %.
 
     Args:
-        angle: of the device (rad), any shape.
-        mass: of the body, m (kg).
-        height: of the body, h (m).
+        angle: angle of the device (rad), any shape.
+        mass: mass of the body, m (kg).
+        height: height of the body, h (m).
     Returns:
         Torque (N m), never negative.
 
@@ -74,11 +73,11 @@ def knee_extension_torque(
 
 
 def dissertations_knee_peak() -> float:
-    """Largest torque of a young man's knee (N m) by the dissertation's own words: about 105.
+    """Largest torque of a young man's knee (N m) according to the dissertation: about 105.
 
     Source:
         Serres 2008, 6.3 and table 23: the station's largest moment, 20.9 N m, is "about 20%" of
-        it. The dissertation prints no torque over angle. Table 23 does not follow from table I3,
-        so that this carries its doubt.
+        it. The dissertation prints no torque over angle. Table 23 does not follow from table I3, so
+        this value is equally uncertain.
     """
     return float(load_table("23")["moment_nm"].max()) / DISSERTATIONS_SHARE

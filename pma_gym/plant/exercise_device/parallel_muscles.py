@@ -1,13 +1,13 @@
-"""Muscles in parallel, of other diameters and lengths, scaled from the tested one's force.
+"""Force of parallel muscles of any diameter and length, scaled from the tested muscle's force.
 
-The ideal geometric law (Serres 2008, Eq. 1 and 3) makes the force of a braided muscle its cross
-section times its pressure times a function of strain: braids of one angle give
+In the ideal geometric law (Serres 2008, Eq. 1 and 3) the force of a braided muscle is cross section
+times pressure times a function of strain. For braids of equal angle this gives
 
     F(P, x; n, d, l) = n (d / d0)^2 F0(P, x l0 / l)
 
-with F0 the static force of the tested muscle, of diameter d0 and length l0. Everything but the
-tested muscle itself is an extrapolation: the law leaves out end caps, the wall's share of the
-diameter and whatever a maker changes from size to size.
+with F0 the static force of the tested muscle, of diameter d0 and length l0. All other
+muscles are extrapolations: the law neglects end caps, wall thickness and differences of design
+between sizes.
 """
 
 from collections.abc import Callable
@@ -18,24 +18,24 @@ import numpy as np
 from pma_gym.units import Quantity
 
 Force = Callable[[np.ndarray, np.ndarray], np.ndarray]
-"""Static force (N) by pressure (Pa) and contraction (m), as `statics.muscle_force` gives it."""
+"""Static force (N) from pressure (Pa) and contraction (m), as `statics.muscle_force` returns it."""
 
 MOST = 100
-"""Muscles side by side: more are a slip of the pen, an assumption."""
+"""Largest number of parallel muscles, an assumption: more is probably a typing error."""
 
 DIAMETER = Quantity("mm", 5, 80, "Serres 2008, 1.2.1.4: Festo has 10, 20 and 40", usual=20)
 LENGTH = Quantity("mm", 40, 2000, "Serres 2008, 2.1.2.1: 250", usual=250)
 
 
 class MusclesError(ValueError):
-    """Muscles that cannot be; says which number, its range, the unit and the mend."""
+    """Invalid muscles; the message has the number, its range, its unit and the fix."""
 
 
 class Muscles(NamedTuple):
-    """Equal muscles side by side on one pulley.
+    """Equal muscles in parallel on one pulley.
 
     Attributes:
-        number: how many, n.
+        number: number of muscles, n.
         diameter: inner diameter at rest, d (m).
         length: length at rest, l (m).
     """
@@ -46,28 +46,28 @@ class Muscles(NamedTuple):
 
     @property
     def ratio(self) -> float:
-        """Force over the tested muscle's at the same strain and pressure: n (d / d0)^2."""
+        """Ratio of the force to the tested muscle's at equal strain and pressure: n (d / d0)^2."""
         return self.number * (self.diameter / TESTED.diameter) ** 2
 
     @property
     def extrapolated(self) -> bool:
-        """Whether anything but the tested muscle alone."""
+        """Whether the muscles differ from the single tested muscle."""
         return self != TESTED
 
 
 TESTED = Muscles(1, 0.020, 0.250)
-"""The muscle on which every station's model rests: Serres 2008, 2.1.2.1, Festo MAS-20-250N."""
+"""The tested muscle, basis of every station model: Serres 2008, 2.1.2.1, Festo MAS-20-250N."""
 
 
 def muscles(number: int, diameter_mm: float, length_mm: float) -> Muscles:
-    """Muscles by the numbers that people have.
+    """Make muscles from their number and their size in mm.
 
     Args:
-        number: how many, side by side.
+        number: number of parallel muscles.
         diameter_mm: inner diameter at rest (mm).
         length_mm: length at rest (mm).
     Raises:
-        MusclesError: a number out of bounds, no number, or not a whole one.
+        MusclesError: a value out of bounds or not a number, or a number that is not whole.
 
     >>> muscles(2, 40, 250).ratio
     8.0
@@ -86,19 +86,19 @@ def muscles(number: int, diameter_mm: float, length_mm: float) -> Muscles:
 
 
 def scaled_force(force: Force, of: Muscles) -> Force:
-    """Static force of muscles scaled from the tested muscle's.
+    """Scale the static force of the tested muscle to other muscles.
 
         F(P, x) = n (d / d0)^2 F0(P, x l0 / l)
 
     Args:
-        force: of the tested muscle, F0.
+        force: force of the tested muscle, F0.
         of: the muscles.
     Returns:
-        Function of pressure (Pa) and contraction (m) giving the force (N) of all of them; for the
-        tested muscle alone the same bits as `force`.
+        Function of pressure (Pa) and contraction (m) that returns the force (N) of all muscles;
+        bit-identical to `force` for the single tested muscle.
     Source:
         1. Serres 2008, Eq. 1 and 3, after H. F. Schulte 1961 and C.-P. Chou and B. Hannaford 1996,
-           at one braid angle: a test holds it against `schulte_force`.
+           at one braid angle; a test compares it with `schulte_force`.
         2. Serres 2008, 6.3: forces of muscles in parallel add.
     """
     stretch = TESTED.length / of.length

@@ -1,4 +1,4 @@
-"""What a trainer prescribes, whether a device can give it, and the smallest one that can."""
+"""Prescribed moments: pressures with which a device produces them, and the smallest such device."""
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
@@ -13,24 +13,24 @@ from pma_gym.units import SI_FACTORS
 
 _DEG = SI_FACTORS["deg"]
 _GRID = 25e3
-"""Largest step between the pressures that a schedule is read off (Pa)."""
+"""Largest step between the pressures of the table behind a schedule (Pa)."""
 
 _ROUNDING = 1e-6
-"""How far a moment may be outside the range by rounding (N m)."""
+"""Tolerance for rounding of a moment at the ends of the range (N m)."""
 
 
 @dataclass(frozen=True)
 class Miss:
-    """Where a device fails a prescription.
+    """The worst point of a prescription that a device cannot produce.
 
     Attributes:
-        device: the one that fails.
-        angle: where it fails most (rad).
+        device: the device.
+        angle: angle with the largest deviation (rad).
         wanted: the prescribed moment there (N m).
         low: smallest moment that a pressure gives there (N m); NaN where none is allowed.
-        high: largest (N m).
+        high: largest moment (N m).
         lowest: lowest pressure of that range (Pa).
-        highest: highest (Pa).
+        highest: highest pressure (Pa).
     """
 
     device: Device
@@ -43,12 +43,12 @@ class Miss:
 
     @property
     def distance(self) -> float:
-        """How far the wanted moment is outside the range (N m); infinite without a range."""
+        """Distance of the prescribed moment from the range (N m); infinite without a range."""
         outside = max(self.low - self.wanted, self.wanted - self.high)
         return outside if np.isfinite(outside) else np.inf
 
     def __str__(self) -> str:
-        """What can be given, at which angle, and the mend."""
+        """Message with the possible moments, the angle and the fix."""
         place = f"at {self.angle / _DEG:.4g} deg"
         if not np.isfinite(self.distance):
             return (
@@ -65,10 +65,10 @@ class Miss:
 
 
 class UnreachableError(ValueError):
-    """A moment that no pressure gives.
+    """No pressure gives the prescribed moment.
 
     Attributes:
-        miss: where, and what could be given there.
+        miss: the worst angle, and the possible moments there.
     """
 
     def __init__(self, miss: Miss, among: int = 1, words: str = "") -> None:
@@ -78,23 +78,23 @@ class UnreachableError(ValueError):
 
 
 class Held(NamedTuple):
-    """A moment held at 90 deg by one pressure (Pa), at which the cable was set too."""
+    """A constant pressure (Pa) that holds a moment at 90 deg, with the cable set at it."""
 
     pressure: float
 
 
 def hold(model: Model, device: Device, moment: float) -> Held:
-    """The constant pressure at which a device holds a moment at 90 deg.
+    """Find the constant pressure at which a device holds a moment at 90 deg.
 
-    The moment is least near 260 kPa; of two pressures the higher is taken, which stretches the
-    muscle less.
+    The moment has its minimum near 260 kPa; of two solutions the higher pressure is returned, which
+    stretches the muscle less.
 
     Args:
-        model: of the station.
+        model: model of the station.
         device: muscles and pulley.
-        moment: wanted at 90 deg (N m).
+        moment: moment at 90 deg (N m).
     Raises:
-        UnreachableError: no pressure gives it, or none allows 90 deg.
+        UnreachableError: no pressure gives the moment, or none allows 90 deg.
     """
     pressure = pressure_grid(model)
     given = resistive_moment(model, device, pressure, FULL_ANGLE)
@@ -111,7 +111,7 @@ def hold(model: Model, device: Device, moment: float) -> Held:
 
 
 class Schedule(NamedTuple):
-    """Pressures (Pa) over the angles of a prescription; the cable was set at rest_pressure (Pa)."""
+    """Pressures (Pa) over the angles of a prescription; the cable is set at rest_pressure (Pa)."""
 
     rest_pressure: float
     pressure: NDArray[np.float64]
@@ -120,18 +120,18 @@ class Schedule(NamedTuple):
 def follow(
     model: Model, device: Device, angle: NDArray[np.float64], moment: NDArray[np.float64]
 ) -> Schedule:
-    """Pressures over the angle at which a device gives a profile of moments.
+    """Find the pressures over angle at which a device follows a profile of moments.
 
-    The cable's length is set once, at the lowest pressure of rest that serves: the lower, the more
-    the muscle pulls at small angles, but the more it is stretched at 90 deg.
+    The cable's length is set once, at the lowest feasible rest pressure. A lower rest pressure
+    gives more moment at small angles but stretches the muscle more at 90 deg.
 
     Args:
-        model: of the station.
+        model: model of the station.
         device: muscles and pulley.
-        angle: of the pulley (rad), shape (n,).
-        moment: wanted (N m), shape (n,).
+        angle: angles of the pulley (rad), shape (n,).
+        moment: prescribed moments (N m), shape (n,).
     Raises:
-        UnreachableError: no pressure of rest serves; it has the angle of the nearest one's miss.
+        UnreachableError: no rest pressure is feasible; with the worst angle at the nearest one.
     """
     pressure = pressure_grid(model, _GRID)
     misses = []
@@ -151,17 +151,17 @@ def follow_from(
     rest_pressure: float,
     rest_moment: float,
 ) -> Schedule:
-    """As `follow`, of a cable that is drawn in until it holds a moment at angle 0 and a pressure.
+    """Do as `follow` with a cable tightened to a given moment at angle 0 and a given pressure.
 
     Args:
-        model: of the station.
+        model: model of the station.
         device: muscles and pulley.
-        angle: of the pulley (rad), shape (n,).
-        moment: wanted (N m), shape (n,).
+        angle: angles of the pulley (rad), shape (n,).
+        moment: prescribed moments (N m), shape (n,).
         rest_pressure: gauge pressure at angle 0 (Pa).
-        rest_moment: moment there (N m); 0 for a cable that hangs slack.
+        rest_moment: moment there (N m); 0 for a slack cable.
     Raises:
-        UnreachableError: where it fails most, and what could be given there.
+        UnreachableError: no schedule; with the worst angle and the possible moments there.
     """
     schedule = _scheduled(model, device, angle, moment, rest_pressure, rest_moment)
     if isinstance(schedule, Miss):
@@ -172,15 +172,15 @@ def follow_from(
 def constant_moments(
     model: Model, device: Device, rest_pressure: float, step: float = 0.25
 ) -> tuple[float, float] | None:
-    """The moments that a device can hold from 0 to 90 deg, the cable drawn in for each.
+    """Find the moments that a device can hold from 0 to 90 deg, with the cable set for each.
 
     Args:
-        model: of the station.
+        model: model of the station.
         device: muscles and pulley.
         rest_pressure: gauge pressure at angle 0 (Pa).
-        step: between the moments tried (N m).
+        step: step between the moments tried (N m).
     Returns:
-        The least and the greatest of those tried (N m); None if it holds none of them.
+        The smallest and the largest feasible moment of those tried (N m); None if none is feasible.
     """
     angle = FULL_ANGLE * np.linspace(0.0, 1.0, 10)
     start = float(resistive_moment(model, device, rest_pressure, FULL_ANGLE).moment)
@@ -236,14 +236,14 @@ Answer = TypeVar("Answer")
 def smallest(
     devices: Iterable[Device], attempt: Callable[[Device], Answer]
 ) -> tuple[Device, Answer]:
-    """The smallest device that gives what is prescribed, and how.
+    """Find the smallest device that produces a prescription, with its pressures.
 
     Args:
-        devices: those to choose from; fewest muscles count first, then diameter, then length, then
+        devices: devices to choose from, ordered by number of muscles, then diameter, length and
             radius.
         attempt: `hold` or `follow` of a prescription; raises UnreachableError where it fails.
     Raises:
-        UnreachableError: none of them gives it; says what the nearest one can.
+        UnreachableError: no device is sufficient; with the possible moments of the nearest one.
     """
     misses = []
     for device in sorted(devices):

@@ -1,1 +1,1 @@
-"""The equations of a plant in other forms: linear, as symbols, in plain Python, as text."""
+"""Other forms of a plant's equations: linearised, symbolic, plain Python, text."""

@@ -1,4 +1,4 @@
-"""A plant linearised about rest, as a state space of python-control."""
+"""Linearisation of a plant about an equilibrium, as a state space of python-control."""
 
 from typing import TYPE_CHECKING
 
@@ -24,34 +24,34 @@ FOLLOWING = tuple(
     if effect.port in ("drive_delay", "drive_lag", "regulator_delay")
     for name in effect.memory_names
 )
-"""Memories that follow a command within milliseconds, and so belong to the linear system."""
+"""States of effects that follow a command within milliseconds and are part of the linear system."""
 
 _STEP, _PRESSURE_STEP, _VOLTAGE_STEP = 1e-7, 100.0, 1e-4
-"""Steps of the central differences: m, rad or 1/s of them; Pa; V."""
+"""Steps of the central differences: m, rad or their rates; Pa; V."""
 
 _AWAY = 1e-6
-"""How far from rest (m/s, m) the motion begins, beyond the kink of the damping there."""
+"""Offset from rest (m/s, m) at which differences begin, beyond the kink of the damping."""
 
 
 def linearize(
     plant: CompiledModel, pressure: float, contraction: float, direction: str = "relaxing"
 ) -> "control.StateSpace":
-    """The plant near rest at a pressure and a contraction, as a linear system.
+    """Linearise the plant about the equilibrium at a pressure and a contraction.
 
-    Damping has two values at rest, so a direction is named; a regulator with two paces gets their
-    mean. Memories (dry friction, hysteresis, creep) stay where they are: the system slides. Sensor
-    lags are left out.
+    Damping has two values at rest, so the caller chooses a direction; a regulator with two rates
+    gets their mean. The states of dry friction, hysteresis and creep are constant: the system
+    slides. Sensor lags are not included.
 
     Args:
         plant: the plant.
         pressure: gauge pressure (Pa).
-        contraction: shortening from the resting length (m), below that at no load.
+        contraction: shortening from the resting length (m), less than without load.
         direction: `relaxing` (the motor pulls) or `contracting`.
     Returns:
         State space with named states, inputs (V) and outputs: contraction and extension (m),
         rotation (rad), load (N), pressure (Pa), all as deviations from rest.
     Raises:
-        ValueError: an unknown direction, or a contraction that no load of 0-10 V holds.
+        ValueError: an unknown direction, or a contraction that no motor voltage of 0-10 V holds.
     """
     rest, commands = operating_point(plant, pressure, contraction)
     return linearize_at(plant, rest, commands, direction)
@@ -63,12 +63,12 @@ def linearize_at(
     commands: tuple[float, float],
     direction: str = "relaxing",
 ) -> "control.StateSpace":
-    """The plant near a condition at rest, as `linearize`; it need not be searched for.
+    """Linearise the plant about a known condition at rest, as `linearize`.
 
     Args:
         plant: the plant.
-        rest: where it stands at rest.
-        commands: motor and regulator voltage that hold it there (V).
+        rest: condition at rest.
+        commands: motor and regulator voltage at it (V).
         direction: `relaxing` (the motor pulls) or `contracting`.
     """
     import control
@@ -108,10 +108,10 @@ def _seen(plant: CompiledModel) -> tuple[str, ...]:
 def operating_point(
     plant: CompiledModel, pressure: float, contraction: float
 ) -> tuple[Condition, tuple[float, float]]:
-    """The condition at rest at a contraction, and the voltages that hold it.
+    """Find the condition at rest at a contraction, and the voltages that hold it.
 
     Raises:
-        ValueError: no voltage of 0-10 V holds it; says which contractions can be held.
+        ValueError: no voltage of 0-10 V holds it; with the range of possible contractions.
     """
     regulator = plant.regulator_voltage(pressure)
     motor = _holding_voltage(plant, regulator, contraction)

@@ -1,7 +1,7 @@
-"""A plant's equations in another notation than traced values: symbols, or words.
+"""A plant's equations in another notation than traced values: symbols or text.
 
-The plant writes the same equations (`station.py`, `cascade.py`); what a law makes of its arguments
-is up to the notation.
+The rig writes the same equations (`station.py`, `cascade.py`); the notation defines the result of a
+law.
 """
 
 from abc import abstractmethod
@@ -17,11 +17,11 @@ from pma_gym.plant.model import Model
 
 
 class Names:
-    """Stands for the graph: gives inputs by name.
+    """Replacement of the graph that makes inputs by name.
 
     Args:
-        make: makes an input of a name.
-        constant: makes a constant of a number; leaves what is none.
+        make: makes an input from a name.
+        constant: makes a constant from a number; returns other values unchanged.
     """
 
     inputs = Graph.inputs
@@ -30,19 +30,19 @@ class Names:
         self._make, self.constant, self.value = make, constant, constant
 
     def input(self, name: str, level: int = HELD) -> Any:  # noqa: ANN401
-        """The input of a name."""
+        """Return the input with a name."""
         return self._make(name)
 
 
 class Notation(PlantEquations):
-    """A plant's equations with values of another kind.
+    """A plant's equations with values of another notation.
 
     Args:
         model: the model.
-        names: makes its inputs and constants.
+        names: makes inputs and constants.
 
     Attributes:
-        roads: by memory of the way travelled: the effect that has it.
+        roads: effects with a rate-independent state, keyed by the state.
     """
 
     def __init__(self, model: Model, names: Names) -> None:
@@ -62,14 +62,14 @@ class Notation(PlantEquations):
 
     @abstractmethod
     def apply(self, law: Callable, *arguments: Any) -> Any:  # noqa: ANN401
-        """What a law makes of its arguments."""
+        """Return a law's value for its arguments, in this notation."""
 
     def call(self, effect: Effect, law: Callable, **other: Any) -> Any:  # noqa: ANN401
-        """As in the equations that are compiled."""
+        """Return the value of an effect's law, as in the compiled equations."""
         return rebind(PlantEquations.call, {"trace": self.apply})(self, effect, law, **other)
 
     def memory(self, effect: Effect) -> Any:  # noqa: ANN401
-        """The memory of an effect, where it stands."""
+        """Return the present state of an effect."""
         if effect.rate_independent_law is None:
             return super().memory(effect)
         (name,) = effect.memory_names
@@ -77,7 +77,7 @@ class Notation(PlantEquations):
         return self[name]
 
     def add_event(self, *_: Any, **__: Any) -> None:
-        """Nothing: where steps end is no part of the equations."""
+        """Do nothing: the ends of steps are not part of the equations."""
 
     def add_breakpoints(self) -> None:
-        """Nothing, as for switches."""
+        """Do nothing, as for events."""

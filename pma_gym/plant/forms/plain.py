@@ -1,14 +1,13 @@
-"""The compiled step once more in plain Python: to read, to print from, to set breakpoints in.
+"""The integrator's step in plain Python, to read, to print and to debug.
 
     plain = PlainPlant(Plant("station"))
     print(plain.text)                       # the arithmetic, line by line
     for made in plain.attempts(rest, motor_voltage=3.0, regulator_voltage=6.0, duration=0.01):
         print(made.length, made.accepted, made.state)
 
-It makes the same attempts in the same order as the compiled integration, some hundred times slower.
-Compiled code rounds a product and a sum at once (fused multiply-add) and adds first what is there
-first, so a step's numbers differ from it by a few units in the last place, and a long trial's by
-what those grow to.
+It makes the same step attempts in the same order as the compiled integration, some hundred times
+slower. Compiled code uses fused multiply-add and another order of sums, so the results of a step
+differ by a few units in the last place. The differences can grow over a long trial.
 """
 
 from collections.abc import Callable, Iterator
@@ -28,15 +27,15 @@ from pma_gym.plant.program import parameter_names
 
 @dataclass(frozen=True)
 class Made:
-    """One attempt at a step.
+    """Result of one step attempt.
 
     Attributes:
-        proposed: size that it was begun with (s).
-        left: time that was left of the span (s).
-        accepted: whether its error was within the tolerance.
-        length: how long it was (s); time passes only if it was accepted.
+        proposed: proposed size (s).
+        left: remaining time of the span (s).
+        accepted: whether the error was within the tolerance.
+        length: size of the attempt (s); time advances only if it is accepted.
         state: state vector after it (SI).
-        size: proposed size of the next (s).
+        size: proposed size of the next attempt (s).
     """
 
     proposed: float
@@ -48,16 +47,16 @@ class Made:
 
 
 class PlainPlant:
-    """A plant whose rates and steps are functions of plain Python.
+    """A plant whose rates and steps are plain Python functions.
 
     Args:
-        plant: the compiled plant that it stands beside.
+        plant: the compiled plant.
 
     Attributes:
         plant: the compiled plant.
-        text: the module: functions `rates` and `attempt`, one line an operation.
-        module: the module itself; replace its functions, or step into them with a debugger.
-        arguments: names of the inputs of each function, as they stand in the equations.
+        text: source of the module: functions `rates` and `attempt`, one operation per line.
+        module: the module; replace its functions, or step into them with a debugger.
+        arguments: names of each function's inputs, as in the equations.
     """
 
     def __init__(self, plant: Plant) -> None:
@@ -96,14 +95,14 @@ class PlainPlant:
         size: float,
         left: float,
     ) -> Made:
-        """One attempt at a step.
+        """Make one step attempt.
 
         Args:
             state: state vector (SI).
             commands: motor and regulator voltage (V).
-            zero_contraction: contraction x0 that the trial began at with no load (m).
+            zero_contraction: contraction x0 without load at the trial's start (m).
             size: proposed size (s).
-            left: time left (s).
+            left: remaining time (s).
         """
         known = self._known(state, commands, zero_contraction) | {"size": size, "left": left}
         *after, following, _, accepted, length = self._call("attempt", known)
@@ -117,7 +116,7 @@ class PlainPlant:
         regulator_voltage: float,
         duration: float,
     ) -> Iterator[Made]:
-        """All attempts of `Plant.step`, one by one; the condition moves along with them."""
+        """Yield the attempts of `Plant.step` one by one, and update the condition with each."""
         left, zero = duration, condition.zero_contraction
         condition.receive(motor_voltage, regulator_voltage)
         while left > 0.0:
@@ -136,7 +135,7 @@ class PlainPlant:
         regulator_voltage: float,
         duration: float,
     ) -> int:
-        """Hold the commands for a while, as `Plant.step`; returns how many attempts were made."""
+        """Step with constant commands, as `Plant.step`, and return the number of attempts."""
         return sum(1 for _ in self.attempts(condition, motor_voltage, regulator_voltage, duration))
 
     def _known(

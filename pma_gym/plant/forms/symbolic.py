@@ -1,4 +1,4 @@
-"""A plant written as equations, from the very text that is simulated."""
+"""A plant's equations of motion as SymPy expressions, from the same source as the simulation."""
 
 from collections.abc import Callable, Sequence
 from functools import cached_property
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def symbolic(plant: CompiledModel) -> "dict[str, sympy.Expr]":
-    """The plant's equations of motion.
+    """Return the plant's equations of motion as SymPy expressions.
 
     Needs SymPy (`pip install "pma-gym[symbolic]"`).
 
@@ -21,9 +21,9 @@ def symbolic(plant: CompiledModel) -> "dict[str, sympy.Expr]":
         plant: the plant.
     Returns:
         SymPy expression of every state's rate, by the state's name. Symbols are the states, the
-        commands, zero_contraction, and parameters as effect.name (SI). A row that is interpolated
-        is a function effect_name of what it is interpolated at. A memory of the way travelled has
-        its slope along the way, times the velocity.
+        commands, zero_contraction, and parameters as effect.name (SI). An interpolated row
+        is a function effect_name of its argument. The rate of a rate-independent state is its slope
+        over distance times the velocity.
     """
     import sympy
 

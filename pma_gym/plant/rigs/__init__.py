@@ -1,4 +1,4 @@
-"""The rigs that a model can be of, one file each: their ports, states and balances."""
+"""The kinds of rig, one file each: their ports, states and balances."""
 
 from pma_gym.plant.rigs.cascade import CASCADE
 from pma_gym.plant.rigs.imposed import IMPOSED
@@ -10,4 +10,4 @@ from pma_gym.plant.rigs.station import STATION
 __all__ = ["RIGS", "Rig"]
 
 RIGS: dict[str, Rig] = {rig.name: rig for rig in (STATION, CASCADE, SLIDE, JOINT, IMPOSED)}
-"""All rigs, by the name that a model file gives as its plant."""
+"""All rigs, keyed by the name in `plant = "..."` of a model file."""

@@ -1,14 +1,14 @@
-"""The cascade: the dissertation's own linear model of motor, then muscle (Serres 2008, 3.2).
+"""The cascade: the dissertation's linear model, a motor followed by a muscle (Serres 2008, 3.2).
 
     x_in = map(V, P)                                   static map of table 18
     u' = (K_M / B_M) (x_in - u)                        servo, or with inertia Eq. 10
     y' = (u - y) K / B                                 muscle, tau = B / K at the pressure
-    c' = (F_ce / K - c) K / B                          what it contracts with no load, by Eq. 16 too
+    c' = (F_ce / K - c) K / B                          contraction without load, also by Eq. 16
     x = c - y                                          contraction
 
-One-way: the muscle does not load the motor. With J = 0 and one pressure, at which c stays F_ce / K,
-this is Eq. 22. The load
-cell is taken to read the spring's share of the extension, K y, which is F_ce - K x.
+The muscle does not load the motor. With J = 0 and a constant pressure, at which c stays F_ce / K,
+this is Eq. 22. We assume that the load cell measures the spring's force of the extension, K y,
+which is F_ce - K x.
 """
 
 from collections.abc import Mapping
@@ -39,7 +39,7 @@ PORTS: dict[str, Port] = {
     "regulator_lag": Port("rate of the pressure (Pa/s)", least=1, most=1),
     "regulator_pace": Port("factor on the regulator's rate, multiplied"),
 }
-"""Ports of the cascade: how many effects each takes, and what becomes of their results."""
+"""Ports of the cascade, with the number of effects and the use of their results."""
 
 REFUSED_EFFECTS: dict[str, str] = {
     "repperger_damping": (
@@ -50,17 +50,17 @@ REFUSED_EFFECTS: dict[str, str] = {
         "a cascade's motor has an angle but no spin to move it by; take plant = 'station'"
     ),
 }
-"""Effects that would fit a port and mean nothing there, and why."""
+"""Effects without a meaning at their port on this rig, with the reason."""
 
 PARTS: tuple[str, ...] = ("contractile_force", "stiffness", "limits", "validity")
-"""Effects that the cascade reads itself and cannot do without."""
+"""Required effects that the cascade reads directly."""
 
 POSITION_TOLERANCES: dict[str, float] = {
     "extension": 0.003,
     "free_contraction": 0.003,
     "servo": 0.01,
 }
-"""States that are asked for more exactly than the others, and their tolerance beside theirs."""
+"""States with a smaller tolerance than the others, and its ratio to theirs."""
 
 SCALES: dict[str, float] = {
     "contraction": 25e-3,
@@ -72,11 +72,11 @@ SCALES: dict[str, float] = {
     "rotation": 1.0,
     "load": 500.0,
 }
-"""What an error is counted against (SI): roughly the range of each quantity in a trial."""
+"""Error scales of the states (SI): roughly the range of each quantity in a trial."""
 
 
 def write_equations(equations: PlantEquations) -> None:
-    """Write the dissertation's cascade, with the model's effects at its ports."""
+    """Write the equations of the dissertation's cascade, with the model's effects at its ports."""
     eq = equations
     stiffness, force = eq.parameters["stiffness"], eq.parameters["contractile_force"]
     eq.let("pressure_asked", eq.one("regulator_line"))
@@ -109,7 +109,7 @@ def write_equations(equations: PlantEquations) -> None:
 
 
 def fastest_oscillation(parameters: Mapping[str, Parameters]) -> float:
-    """Frequency (rad/s) of the motor on its position loop; 0 without inertia."""
+    """Natural frequency (rad/s) of the motor with its position loop; 0 without inertia."""
     inertial = parameters.get("servo_inertia")
     return (parameters["servo"].stiffness / inertial.inertia) ** 0.5 if inertial else 0.0
 
@@ -125,7 +125,7 @@ def _write_servo(eq: PlantEquations) -> None:
 
 
 def solve_equilibrium(problem: EquilibriumProblem) -> None:
-    """Put the motor where it stands still, and the muscle behind it."""
+    """Set the motor, and then the muscle, to their steady states."""
     problem.relax("servo", of="servo_rate" if "servo_rate" in problem.names else "servo")
     problem["extension"] = problem["servo"]
     # From below: the muscle's pace there is that of shortening all the way.

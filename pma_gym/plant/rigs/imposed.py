@@ -1,10 +1,10 @@
-"""The imposed motion: another drive moves a muscle, a rod or a seal; force is what is measured.
+"""The imposed motion: an external drive moves a muscle, a rod or a seal, and the force is measured.
 
-    x'' = w^2 (c - x) - 2 w x'                         c the motion's record ahead of the states
+x'' = w^2 (c - x) - 2 w x'                         c the record, advanced by the states' lag
     F = F_muscle(P, x, memories) + F_contact(P, x, x', memories) - B x'
 
-The motion is the input, so nothing has to balance: F is what the drive feels, without the inertia
-of what hangs on it. The pressure is commanded behind a regulator, or as it was measured.
+The motion is the input, so there is no balance of forces: F is the force on the drive, without the
+inertia of the moved parts. The pressure follows a regulator's command or a measured record.
 """
 
 from collections.abc import Mapping
@@ -33,13 +33,13 @@ PORTS: dict[str, Port] = {
     "regulator_lag": Port("rate of the pressure (Pa/s)", most=1),
     "regulator_pace": STATION_PORTS["regulator_pace"],
 }
-"""Ports of the rig: how many effects each takes, and what becomes of their results."""
+"""Ports of the rig, with the number of effects and the use of their results."""
 
 REFUSED_EFFECTS: dict[str, str] = {
     "load_dependent_damping": "there is no cable; take [damping] or [symmetric_damping]",
     "residual_load": "there is no load beside the force that is measured",
 }
-"""Effects that would fit a port and mean nothing there, and why."""
+"""Effects without a meaning at their port on this rig, with the reason."""
 
 SCALES: dict[str, float] = {
     "contraction": 25e-3,
@@ -47,11 +47,11 @@ SCALES: dict[str, float] = {
     "pressure": 500e3,
     "force": 500.0,
 }
-"""What an error is counted against (SI): roughly the range of each quantity in a trial."""
+"""Error scales of the states (SI): roughly the range of each quantity in a trial."""
 
 
 def write_equations(equations: PlantEquations) -> None:
-    """Write the motion and the force, with the model's effects at its ports."""
+    """Write the equations of motion and force, with the model's effects at its ports."""
     eq = equations
     eq.travelled = (eq["contraction"], eq["velocity"])
     # The states follow two commands, a position (m) and what gives the pressure (V or Pa).
@@ -85,12 +85,12 @@ def write_equations(equations: PlantEquations) -> None:
 
 
 def fastest_oscillation(parameters: Mapping[str, Parameters]) -> float:
-    """0: the motion is given."""
+    """Return 0, because the motion is given."""
     return 0.0
 
 
 def solve_equilibrium(problem: EquilibriumProblem) -> None:
-    """Put the states where the first commands hold them."""
+    """Set the states to their steady values at the first commands."""
     problem.relax("pressure")
     problem["velocity"] = 0.0
     problem.relax("contraction", of="velocity")

@@ -1,8 +1,8 @@
-"""The joint: one rotary axis, turned by a drive that holds a torque or by a motor at a voltage.
+"""The joint: one rotary axis with a torque-controlled drive or a DC motor at a voltage.
 
     J q'' = T_drive(command, q') + T(q, q', memories)
 
-Nothing holds it: a trial begins where [joint_start] says, as fast as it says. Weight, spring,
+The joint is free: [joint_start] gives the initial angle and speed of a trial. Weight, spring,
 damping and dry friction are effects at its port of torques.
 """
 
@@ -24,20 +24,20 @@ PORTS: dict[str, Port] = {
     "joint_load": Port("torque that the joint carries at rest (N m), added; positive likewise"),
     "joint_torque": Port("torque on the joint (N m), added; positive as the angle grows"),
 }
-"""Ports of the joint: how many effects each takes, and what becomes of their results."""
+"""Ports of the joint, with the number of effects and the use of their results."""
 
 SCALES: dict[str, float] = {"angle": 1.0, "spin": 4.0}
-"""What an error is counted against (rad, rad/s)."""
+"""Error scales of angle and speed (rad, rad/s)."""
 
 LEAST_COMMAND = 0.1
-"""What an error of a command on its way is counted against (N m, V): a small drive's range."""
+"""Error scales of delayed commands (N m, V): the range of a small drive."""
 
 TURNING_RAD = 1e-8
-"""Angle (rad) by which a step may miss where the joint turns."""
+"""Tolerance of the angle (rad) at which a step ends when the joint reverses."""
 
 
 def write_equations(equations: PlantEquations) -> None:
-    """Write the balance of the joint, with the model's effects at its ports."""
+    """Write the equation of motion of the joint, with the model's effects at its ports."""
     eq = equations
     eq.travelled = (eq["angle"], eq["spin"])
     # Laws of friction know the rate of what they act on as `velocity`.
@@ -62,12 +62,12 @@ def write_equations(equations: PlantEquations) -> None:
 
 
 def fastest_oscillation(parameters: Mapping[str, Parameters]) -> float:
-    """0: nothing swings against another."""
+    """Return 0, because the rig has only one inertia."""
     return 0.0
 
 
 def solve_equilibrium(problem: EquilibriumProblem) -> None:
-    """Put the joint where its model says that a trial begins; its bristles are relaxed."""
+    """Set the joint to the model's initial state, with relaxed bristles."""
     start = problem.parameters("joint_start")
     problem.zero[:] = problem["angle"] = start["angle"]
     problem["spin"] = start["spin"]

@@ -1,4 +1,4 @@
-"""What a rig is: its ports, parts, balances and equilibrium, and what can be asked of it."""
+"""The class `Rig`: the ports, parts, balances and equilibrium of a kind of rig."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -15,35 +15,36 @@ class Rig:
     """A kind of rig. A new one is one file beside this one, and one line of the registry.
 
     Attributes:
-        name: its name, as `plant = "..."` of a model file says it.
-        signals: what its sensors measure, in the order of its outputs.
-        ports: its ports: how many effects each takes, and what becomes of their results.
-        parts: effects that it reads itself and cannot do without.
-        position_tolerances: states that are held to a smaller error than the others, and their
-            tolerance as a share of the others'.
-        write_equations: writes its balances, with the model's effects at its ports.
-        solve_equilibrium: puts the states of an `EquilibriumProblem` where they stand still.
-        fastest_oscillation: angular frequency (rad/s) of its fastest oscillation by the effects'
-            parameters; 0 if nothing swings.
-        refused_effects: effects that would fit a port and mean nothing there, and why.
-        absent_signals: why it has no other signals, and what to do with a log that has them.
-        shipped_example: shipped model that a missing part can be copied from; "" for none.
-        balances_loads: a muscle balances the load of the drive, so a load has an equilibrium and a
-            person or a weight can act on it.
-        is_free: nothing holds it: no command has an equilibrium, and a trial begins where its
-            [start] says.
-        has_muscle: it has one, with a pressure and limits of its own.
-        is_diagnosable: it is a balance of forces that effects add to, as a diagnosis needs.
-        needed_ports: port at which a model must have an effect for one to be missing at another,
-            by that other: a rig without a regulator misses no lag of one.
-        modifying_ports: ports whose effects do nothing but change what others do.
-        moving_lags: states of sensors' lags whose quantity moves where a trial begins, and the
-            state that is its rate.
-        start_paths: parameters of a free rig that say where a trial begins, by the state that is
-            there then: its position, then its speed.
+        name: name of the rig, as in `plant = "..."` of a model file.
+        signals: measured signals, in the order of its outputs.
+        ports: ports, with the number of effects and the use of their results.
+        parts: required effects that the rig reads directly.
+        position_tolerances: states with a smaller tolerance than the others, and its ratio to
+            theirs.
+        write_equations: writes the equations of motion, with the model's effects at the ports.
+        solve_equilibrium: sets the states of an `EquilibriumProblem` to equilibrium.
+        fastest_oscillation: angular frequency (rad/s) of the fastest oscillation for given
+            parameters; 0 if there is none.
+        refused_effects: effects without a meaning at their port on this rig, with the reason.
+        absent_signals: reason why the rig lacks other signals, and what to do with a log that has
+            them.
+        shipped_example: shipped model to copy a missing part from; "" for none.
+        balances_loads: whether a muscle balances the drive's load, so that a load has an
+            equilibrium and a person or a weight can act.
+        is_free: whether the rig has no equilibrium; the [start] table gives the initial state.
+        has_muscle: whether it has a muscle, with pressure and limits.
+        is_diagnosable: whether it is a balance of forces that effects add to, as a diagnosis needs.
+        needed_ports: for a port, the other port at which a model must have an effect before one can
+            be missing there: a rig without a regulator cannot lack a regulator's lag.
+        modifying_ports: ports whose effects only modify other effects.
+        moving_lags: states of sensor lags whose input moves at the start of a trial, with the state
+            that is the input's rate.
+        start_paths: parameters of a free rig's initial state, keyed by the state: position, then
+            speed.
         drive_port: port of the drive whose force moves a free rig.
-        imposes_motion: its drive takes a record of positions, and forces follow from the motion.
-        direct_commands: command that each of its drives takes as it comes, without a line of volts.
+        imposes_motion: whether the drive follows a record of positions and the force is an output.
+        direct_commands: for each drive, the command in SI that it takes without a voltage
+            calibration.
     """
 
     name: str
@@ -71,5 +72,5 @@ class Rig:
 
     @property
     def outputs(self) -> tuple[str, ...]:
-        """Names of its signals, as its equations and trials call them."""
+        """Names of the rig's signals, as in its equations and trials."""
         return tuple(signal.name for signal in self.signals)

@@ -1,10 +1,10 @@
-"""The slide: a rig without a muscle, moved by a rigid drive that pushes and pulls.
+"""The slide: a rig without a muscle and with a rigid drive that pushes and pulls.
 
-    m x'' + B x' = F(x, x', memories) - L       x contraction, L the load that the drive gives
+    m x'' + B x' = F(x, x', memories) - L       x contraction, L the load of the drive
 
-Nothing holds it, so no command has a rest: a trial begins where [start] says, as fast as it says.
-There is no pulley and no pressure; L is a command, so a load cell in the link would
-measure nothing new.
+The slide is free and has no equilibrium: [start] gives the initial position and speed of a trial.
+There is no pulley and no pressure. L is a command, so a load cell in the link would add no
+information.
 """
 
 from collections.abc import Mapping
@@ -29,7 +29,7 @@ PORTS: dict[str, Port] = {
     "drive_gain": Port("force of the drive besides (N), added; positive as the contraction grows"),
     "drive_loss": Port("force that the drive loses on its way (N), added; positive likewise"),
 }
-"""Ports of the slide: how many effects each takes, and what becomes of their results."""
+"""Ports of the slide, with the number of effects and the use of their results."""
 
 _PLACE = (
     "the zero of a slide's position is free in every trial, so a law of the place has none; "
@@ -41,17 +41,17 @@ REFUSED_EFFECTS: dict[str, str] = {
     "hand_push": "nobody settles a slide that nothing holds; take plant = 'station'",
     "residual_force_of_pressure": "it has no pressure; take plant = 'station'",
 }
-"""Effects that would fit a port and mean nothing there, and why."""
+"""Effects without a meaning at their port on this rig, with the reason."""
 
 PARTS: tuple[str, ...] = ("slide", "start")
-"""Effects of port `part` that the slide reads itself and cannot do without."""
+"""Required effects of port `part`, which the slide reads directly."""
 
 POSITION_TOLERANCES: dict[str, float] = {"contraction": 0.001}
-"""States that are asked for more exactly than the others, and their tolerance beside theirs."""
+"""States with a smaller tolerance than the others, and its ratio to theirs."""
 
 
 def write_equations(equations: PlantEquations) -> None:
-    """Write the balance of the slide, with the model's effects at its ports."""
+    """Write the equation of motion of the slide, with the model's effects at its ports."""
     eq = equations
     slide = eq.parameters["slide"]
     eq.travelled = (eq["contraction"], eq["velocity"])
@@ -78,12 +78,12 @@ def write_equations(equations: PlantEquations) -> None:
 
 
 def fastest_oscillation(parameters: Mapping[str, Parameters]) -> float:
-    """0: nothing swings."""
+    """Return 0, because the rig has no oscillation."""
     return 0.0
 
 
 def solve_equilibrium(problem: EquilibriumProblem) -> None:
-    """Put the slide where its model says that a trial begins; its bristles are relaxed."""
+    """Set the slide to the model's initial state, with relaxed bristles."""
     start = problem.parameters("start")
     problem.zero[:] = problem["contraction"] = start["contraction"]
     problem["velocity"] = start["velocity"]

@@ -1,11 +1,11 @@
-"""The station: muscle and slide, cable, rotor, regulator, sensors; a balance of forces.
+"""The station: muscle and slide, cable, rotor, regulator and sensors, as a balance of forces.
 
     m x'' + B x' = F(P, x, memories) - T              muscle and slide, x contraction
-    J theta'' + B_M theta' = r (L - T)                 rotor, L the load that the drive gives
+    J theta'' + B_M theta' = r (L - T)                 rotor, L the load of the drive
     T = tension(s, s'),  s = r theta - (x0 - x)        cable, x0 the contraction at no load
     P' from the regulator's lag                        regulator
 
-The tension T is what the load cell reads. Effects add to these balances at their ports.
+The load cell measures the tension T. Effects add to these balances at their ports.
 """
 
 from collections.abc import Mapping
@@ -22,11 +22,11 @@ from pma_gym.plant.equilibrium.force_balance import solve_station
 from pma_gym.plant.rigs.rig import Rig
 
 PARTS: tuple[str, ...] = ("rotor", "slide", "limits", "validity")
-"""Effects of port `part` that the station reads itself and cannot do without."""
+"""Required effects of port `part`, which the station reads directly."""
 
 POSITION_TOLERANCES: dict[str, float] = {"contraction": 0.001, "angle": 0.001}
-"""States that are asked for more exactly than the others, and their tolerance beside theirs: dry
-friction turns an error of 1 nm into one of a ten-thousandth of its force."""
+"""States with a smaller tolerance than the others, and its ratio to theirs: with dry friction, an
+error of 1 nm causes an error of a ten-thousandth of the friction force."""
 
 SCALES: dict[str, float] = {
     "contraction": 25e-3,
@@ -37,15 +37,15 @@ SCALES: dict[str, float] = {
     "rotation": 1.0,
     "load": 500.0,
 }
-"""What an error is counted against (SI): roughly the range of each quantity in a trial."""
+"""Error scales of the states (SI): roughly the range of each quantity in a trial."""
 
 
 TURNING_M, TIGHTENING_M = 2e-10, 1e-8
-"""Ways (m) by which a step may miss where the slide turns, and where cable or muscle tighten."""
+"""Tolerances (m) of the events: the slide reverses, and cable or muscle tighten."""
 
 
 def write_equations(equations: PlantEquations) -> None:
-    """Write the balance of the station, with the model's effects at its ports."""
+    """Write the equations of motion of the station, with the model's effects at its ports."""
     eq = equations
     rotor = eq.parameters["rotor"]
     eq.travelled = (eq["contraction"], eq["velocity"])
@@ -71,7 +71,7 @@ def write_equations(equations: PlantEquations) -> None:
 
 
 def fastest_oscillation(parameters: Mapping[str, Parameters]) -> float:
-    """Frequency (rad/s) at which slide and rotor swing against each other on the cable."""
+    """Frequency (rad/s) of the oscillation of slide against rotor on the cable."""
     rotor, slide = parameters["rotor"], parameters["slide"]
     return (
         parameters["cable"].stiffness * (1.0 / slide.mass + rotor.radius**2 / rotor.inertia)

@@ -51,7 +51,7 @@ def open_loop(plant, task, pressure_kpa=300.0):
 def test_with_all_faults_it_is_the_dissertations(plant, task, pressure):
     own = open_loop(plant, task, pressure)
     printed = SerresFeedforward()
-    printed.reset(TASKS[task].protocol.at, own.station)
+    printed.reset(TASKS[task].schedule.at, own.station)
     volts = [printed.act(AT_REST, 0.01 * k) for k in range(TASKS[task].steps(100.0))]
     assert own.voltages(frozenset(causes_of(task))) == pytest.approx(volts, abs=1e-5)
 

@@ -165,7 +165,8 @@ def test_only_what_was_made_with_the_same_is_used_again(suite, tmp_path, monkeyp
         monkeypatch.setattr(module, "code_digest", lambda: "another")
     assert len(pending_cases(suite, entries, out).missing) == 12
     _, words = run(suite, "pid", out)
-    assert "6 rows there were made with other options" in words
+    assert f"6 rows in {out / JOURNAL} were made with other options" in " ".join(words.split())
+    assert "--out names another folder" in words
     # What was made with other code is not compared with what is made now.
     assert {row["controller"] for row in finished_rows(out)} == {"pid"}
 

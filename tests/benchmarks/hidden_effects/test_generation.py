@@ -14,7 +14,7 @@ from benchmarks.hidden_effects.generation.blocks import Block
 from benchmarks.hidden_effects.generation.cases import BLOCKS, draw_case
 from benchmarks.hidden_effects.generation.effect_size import simulate_variants
 from benchmarks.hidden_effects.generation.effects import ALL, KINDS
-from benchmarks.hidden_effects.generation.excitation import PROTOCOLS, draw_trial
+from benchmarks.hidden_effects.generation.excitation import EXCITATIONS, draw_trial
 from benchmarks.hidden_effects.generation.expected_parameters import expected
 from benchmarks.hidden_effects.generation.groups import GROUPS, group
 from benchmarks.hidden_effects.physics.rig import NOMINAL, SENSORS, SIGNALS, noise_levels
@@ -81,7 +81,7 @@ SHAPES = {
 @pytest.fixture(scope="module")
 def commands():
     g = np.random.default_rng(5)
-    drawn = [draw_trial(g, name, 4.0, False, False) for name in PROTOCOLS]
+    drawn = [draw_trial(g, name, 4.0, False, False) for name in EXCITATIONS]
     drawn.append(draw_trial(g, "triangles", 4.0, True, False))
     drawn.append(draw_trial(g, "reversals", 4.0, False, True))
     motor, regulator = zip(*drawn, strict=True)
@@ -166,7 +166,7 @@ def test_does_what_the_catalogue_says(name, lab, commands, ours, theirs):
     noise = noise_levels(np.ones(4))
     change = ((ours[1][name] - ours[0]) / noise).ravel()
     wanted = ((plants_readings(model, commands) - theirs) / noise).ravel()
-    assert np.sqrt(np.mean(change**2)) > 0.3, "the protocols do not excite it"
+    assert np.sqrt(np.mean(change**2)) > 0.3, "the excitations do not excite it"
     assert change @ wanted / np.linalg.norm(change) / np.linalg.norm(wanted) > 0.8
     assert 0.4 < np.linalg.norm(change) / np.linalg.norm(wanted) < 2.5
 

@@ -227,7 +227,7 @@ def test_what_is_proposed_is_carried_out_on_the_same_rig(case):
     first = Answer(said, following=(np.full(150, 3.0), np.full(150, 5.0)))
     rounds = follow(case, first, 2, asking)
     assert [len(rounds[way]) for way in ("proposed", "random")] == [1, 1]
-    assert rounds["proposed"][0]["protocol"] == "a short hold"
+    assert rounds["proposed"][0]["excitation"] == "a short hold"
     assert rounds["proposed"][0]["said"] == "hysteresis" and rounds["proposed"][0]["wrong"]
     more = with_trial(case, (np.full(150, 3.0), np.full(150, 5.0)), np.random.default_rng(3))
     assert len(more.readings) == len(case.readings) + 1 and more.readings[-1].shape == (150, 4)

@@ -1,4 +1,4 @@
-"""The identified station: its formulas against the simulated protocol, its fit, its judgement."""
+"""The identified station: its formulas against the simulated load cycle, its fit, its judgement."""
 
 import numpy as np
 import pytest
@@ -20,8 +20,8 @@ def station():
     return load_model("station")
 
 
-def simulated_protocol(plant, pressure, load):
-    """Extension at 10 s and return by 15 s of I3's protocol, run on the plant (mm)."""
+def simulated_load_cycle(plant, pressure, load):
+    """Extension at 10 s and return by 15 s of I3's load cycle, run on the plant (mm)."""
     drive = plant.model.parameters["drive"]
     time = np.array([0.0, 5.0, 10.0, 15.0])
     volts = (np.array([0.0, load, load, 0.0]) - drive.offset) / drive.gain
@@ -34,12 +34,12 @@ def simulated_protocol(plant, pressure, load):
 
 
 @pytest.mark.parametrize(("pressure", "load"), [(150e3, 300.0), (300e3, 600.0), (550e3, 825.0)])
-def test_formulas_of_i3_equal_the_simulated_protocol(station, pressure, load):
+def test_formulas_of_i3_equal_the_simulated_load_cycle(station, pressure, load):
     frictionless = station.replace(
         {"coulomb_friction.static_n": 0.0, "coulomb_friction.dynamic_n": 0.0, "drive.offset_n": 0.0}
     )
-    extension, returned, rotation, back = simulated_protocol(Plant(frictionless), pressure, load)
-    predicted = statics.protocol(station, np.array([pressure]), np.array([load]))
+    extension, returned, rotation, back = simulated_load_cycle(Plant(frictionless), pressure, load)
+    predicted = statics.load_cycle(station, np.array([pressure]), np.array([load]))
     assert 1e3 * predicted.extension[0] == pytest.approx(extension, abs=0.02)
     # Without the drive's offset of -2 N, which lets go of the cable before 15 s (0.16 mm).
     assert 1e3 * predicted.returned[0] == pytest.approx(returned, abs=0.1)

@@ -33,10 +33,10 @@ from benchmarks.measured.triangles import TRIANGLES, Held
 from pma_gym.data.datasets.dataset import read_dataset
 from pma_gym.data.files.trial_files import TrialWarning
 from pma_gym.data.serres2008 import load_table
-from pma_gym.discovery.diagnosis import ADDED
 from pma_gym.discovery.preparation.initial_floors import initial_floors
 from pma_gym.discovery.preparation.noise import white_noise
 from pma_gym.discovery.preparation.whitened_residuals import WhitenedResiduals
+from pma_gym.discovery.result.candidate import ADDED
 from pma_gym.estimation.logged import Logged
 from pma_gym.plant.model import load_model
 

@@ -55,7 +55,7 @@ def simulated_suite(stations=16, controllers=tuple(LEVELS), targets=(), delay=0.
 
 def simulated_row(suite, name, episode, percent, failure=""):
     """A row of a case whose error is so many percent of the range in all phases."""
-    protocol = EVERY_TASK[episode.task].protocol
+    schedule = EVERY_TASK[episode.task].schedule
     row = {
         "suite": suite.name,
         "version": suite.version,
@@ -66,11 +66,11 @@ def simulated_row(suite, name, episode, percent, failure=""):
     }
     if failure:
         return row
-    error = percent / 100.0 * protocol.span / SI_FACTORS[protocol.unit]
+    error = percent / 100.0 * schedule.span / SI_FACTORS[schedule.unit]
     phase = {"rmse": error, "percent_of_range": percent, "largest_error": 3.0 * error}
     return row | {
-        "unit": protocol.unit,
-        "phases": {each.name: dict(phase) for each in protocol.phases},
+        "unit": schedule.unit,
+        "phases": {each.name: dict(phase) for each in schedule.phases},
         "rmse": error,
         "start_rmse": 2.0 * error,
         "steady_rmse": 0.9 * error,

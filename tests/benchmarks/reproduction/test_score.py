@@ -6,9 +6,9 @@ import pytest
 from benchmarks.reproduction.replay import ReplayError, summarise, table_angle
 from benchmarks.reproduction.targets import Check
 from benchmarks.runner.phase_score import PHASES, measured_score, score_trial
-from pma_gym.data.protocol import PROTOCOLS
 from pma_gym.data.serres2008 import load_table, pressures
 from pma_gym.data.trial import Trial
+from pma_gym.data.trial_schedule import SCHEDULES
 from pma_gym.metrics import PHASE_SAMPLES, SAMPLE_RATE_HZ, phase_times, rmse_from_regression
 from pma_gym.studies.trials import measured_regression
 from pma_gym.units import SI_FACTORS
@@ -16,10 +16,10 @@ from pma_gym.units import SI_FACTORS
 
 def trial_of(task, pressure):
     """A trial with the slope, intercept and residual that the tables print."""
-    protocol = PROTOCOLS[task]
-    samples = round(protocol.phases[-1].start * SAMPLE_RATE_HZ) + PHASE_SAMPLES
+    schedule = SCHEDULES[task]
+    samples = round(schedule.phases[-1].start * SAMPLE_RATE_HZ) + PHASE_SAMPLES
     position = np.empty(samples)
-    for phase in protocol.phases:
+    for phase in schedule.phases:
         line = measured_regression(phase.name, pressure)
         own = phase_times()
         wiggle = np.cos(40.0 * own)
@@ -28,7 +28,7 @@ def trial_of(task, pressure):
         first = round(phase.start * SAMPLE_RATE_HZ)
         position[first : first + PHASE_SAMPLES] = line.intercept + line.slope * own + wiggle
     time = np.arange(samples) / SAMPLE_RATE_HZ
-    truth = {protocol.quantity: position * SI_FACTORS[protocol.unit]}
+    truth = {schedule.quantity: position * SI_FACTORS[schedule.unit]}
     return Trial(time, {"motor_voltage": np.zeros(samples)}, truth=truth)
 
 

@@ -89,7 +89,7 @@ def test_damaged_cases_are_made_anew_and_the_others_stay(folder, whole, rubbish,
 
 
 @pytest.mark.parametrize("key", ["truth", "answer", "rounds", "seconds", "number", "code"])
-@pytest.mark.parametrize("value", [3, [], {}, "text", {"a": 1}, {"seed": 4}])
+@pytest.mark.parametrize("value", [3, [], "text", {"seed": 4}])
 def test_a_record_of_another_form_is_made_anew(folder, key, value):
     path = folder / "cases/case_0003.json"
     record = json.loads(path.read_text())

@@ -27,11 +27,11 @@ CALM = {"contraction": [0.03], "load": [100.0], "pressure": [3e5]}
 
 def episode(task, error, voltages=(1.0, 2.0), truth=CALM, act_seconds=(1e-6,)):
     """An episode whose position is off the ideal by `error` (m or rad) by time (s)."""
-    protocol = TASKS[task].protocol
-    last = protocol.phases[-1]
+    schedule = TASKS[task].schedule
+    last = schedule.phases[-1]
     time = np.arange(last.first + last.samples) / SAMPLE_RATE_HZ
     position = np.empty(len(time))
-    for phase in protocol.phases:
+    for phase in schedule.phases:
         own = slice(phase.first, phase.first + phase.samples)
         position[own] = phase.reference(phase.times)
     return Episode(position + error(time), voltages, truth, act_seconds)

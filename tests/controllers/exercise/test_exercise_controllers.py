@@ -18,7 +18,7 @@ def rmse(name, task, seed, **options):
         *_, over, done, info = env.step(env.action(controller.act(env.measurement, env.time)))
         ended = over or done
     assert info["ended_by"] == ""
-    return np.sqrt([env._engine.numbers(f"sum_{p.name}")[0] for p in env.task.protocol.phases])
+    return np.sqrt([env._engine.numbers(f"sum_{p.name}")[0] for p in env.task.schedule.phases])
 
 
 @pytest.mark.parametrize("options", [{}, {"control_rate_hz": 50.0, "action_delay_s": 0.02}])

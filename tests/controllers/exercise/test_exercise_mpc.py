@@ -22,7 +22,7 @@ def rmse(name, task, seed, **options):
         *_, terminated, truncated, info = env.step(env.action(voltage))
         ended = terminated or truncated
     assert info["ended_by"] == ""
-    return np.array(list(info[f"rmse_by_phase_{env.task.protocol.suffix}"].values()))
+    return np.array(list(info[f"rmse_by_phase_{env.task.schedule.suffix}"].values()))
 
 
 @pytest.fixture(scope="module")

@@ -26,12 +26,12 @@ def station_of(task="displacement", pressure_kpa=300.0, model="station", rate=10
 
 def motion_of(*args, **kwargs):
     where = station_of(*args, **kwargs)
-    return nominal_motion(where.task.protocol.at, where)
+    return nominal_motion(where.task.schedule.at, where)
 
 
 def full_response(where: StationInfo, position: float, steps: int) -> np.ndarray:
     """Measured position after 1, 2... periods of 1 V, with all states of the plant."""
-    plant, quantity = Plant(where.model), where.task.protocol.quantity
+    plant, quantity = Plant(where.model), where.task.schedule.quantity
     rest = plant.settle(0.0, pressure=where.pressure).zero_contraction
     radius = where.model.parameters["rotor"].radius if quantity == "rotation" else 1.0
     system = linearize(plant, where.pressure, rest - radius * position, "relaxing")
@@ -53,7 +53,7 @@ def full_response(where: StationInfo, position: float, steps: int) -> np.ndarray
 )
 def test_reduced_models_answer_a_step_as_the_whole_plant(task, pressure, share, rate):
     motion = motion_of(task, pressure, rate=rate)
-    position = share * motion.station.task.protocol.span
+    position = share * motion.station.task.schedule.span
     local = motion.local(position)
     full = full_response(motion.station, position, 60)
     reduced = step_response(local.a, local.b, local.c, 60)
@@ -71,7 +71,7 @@ def test_gain_is_the_slope_of_the_plants_statics(task, pressure):
         for voltage in (volts - 1e-3, volts + 1e-3):
             rest = plant.settle(voltage, pressure=motion.station.pressure)
             truth = plant.observe(rest.state[None, :], rest.zero_contraction)
-            name = motion.station.task.protocol.quantity
+            name = motion.station.task.schedule.quantity
             ends.append(float(truth[name][0]))
         assert stroke.models[at].gain == pytest.approx((ends[1] - ends[0]) / 2e-3, rel=0.02)
         share = at / (len(stroke.models) - 1)
@@ -127,7 +127,7 @@ def test_what_is_kept_changes_no_bit():
     assert again.volts is first.volts  # computed once
     assert not np.array_equal(again.volts, motion_of("rotation", 310).volts)
     copied = replace(first.station, model=first.station.model.replace({}))
-    assert nominal_motion(copied.task.protocol.at, copied).volts is first.volts
+    assert nominal_motion(copied.task.schedule.at, copied).volts is first.volts
     with pytest.raises(ValueError, match="read-only"):
         first.volts[0] = 1.0
 
@@ -142,7 +142,7 @@ def test_another_reference_is_followed_although_the_task_has_its_own():
 @pytest.mark.parametrize("task", ["displacement_steps", "rotation_steps"])
 def test_a_jump_becomes_a_way_that_the_drive_can_go(task):
     motion = motion_of(task, 300)
-    reference, span = motion.station.task.protocol.reference, motion.station.task.protocol.span
+    reference, span = motion.station.task.schedule.reference, motion.station.task.schedule.span
     times = 2e-3 * np.arange(5000)
     planned = np.array([motion.planned(t) for t in times.tolist()])
     wanted = reference(times)
@@ -166,7 +166,7 @@ def test_a_regulators_task_begins_under_its_load():
     drive, line = (where.model.parameters[n] for n in ("drive", "regulator_line"))
     assert drive.gain * motor + drive.offset == pytest.approx(200.0)
     assert line.gain * regulator + line.offset == pytest.approx(300e3)
-    motion = nominal_motion(where.task.protocol.at, where)
+    motion = nominal_motion(where.task.schedule.at, where)
     assert motion.pressure_correction(5e-3, 320e3) == 0.0
     # More voltage, more pressure, more contraction.
     assert all(model.gain > 0.0 for model in motion.stroke.models)

@@ -106,7 +106,7 @@ def test_observer_foresees_a_plant_of_its_own_kind(constants, station, reading):
 def test_regulator_has_two_lags(station):
     task = ISOTONIC["isotonic"]
     given = replace(station(pressure_kpa=250.0), task=task)
-    observer = ExtendedStateObserver(nominal_motion(task.protocol.at, given), 0.5)
+    observer = ExtendedStateObserver(nominal_motion(task.schedule.at, given), 0.5)
     assert observer.order == 2
     regulator, muscle = observer.places[0].lags.constants
     # The regulator's lag and its mean with venting; B / K of the muscle about 0.05 s.

@@ -20,7 +20,7 @@ def seen(task, reading, time):
     station = StationInfo(load_model("station"), named_task(task), 400e3, 0.01)
     view = ObservationSpec("tracking", 1, 0)
     pilot = PolicyAdapter(view, ActionMapping("increment", 0.5))
-    pilot.reset(station.task.protocol.at, station)
+    pilot.reset(station.task.schedule.at, station)
     names = [name for name, _ in view.rows(station)]
     entries = pilot.update(reading, time).tolist()
     # The regulator rests where it holds the trial's pressure.

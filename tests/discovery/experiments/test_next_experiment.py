@@ -14,7 +14,8 @@ from pma_gym.discovery.fitting.fit_problem import FitProblem, Fitted
 from pma_gym.discovery.fitting.free_parameters import FreeParameters, prior
 from pma_gym.discovery.preparation.noise import white_noise
 from pma_gym.discovery.screening.candidates import candidate_effects
-from pma_gym.discovery.screening.score_test import SHOWN_GAIN, Baseline, screen
+from pma_gym.discovery.screening.probe_scores import Baseline
+from pma_gym.discovery.screening.score_test import SHOWN_GAIN, screen
 from pma_gym.plant import sensors
 from pma_gym.plant.model import Model, load_model
 from pma_gym.plant.plant import Plant
@@ -146,11 +147,11 @@ def test_one_rival_needs_no_experiment():
     assert next_experiment(on, rivals[:1], 0) is None
 
 
-def test_every_protocol_is_safe_and_as_long_as_a_test_may_be():
+def test_every_excitation_is_safe_and_as_long_as_a_test_may_be():
     model = station()
-    protocols = list(library([model]))
-    assert len(protocols) == 30 and len({each.name for each in protocols}) == 30
-    for each in protocols:
+    excitations = list(library([model]))
+    assert len(excitations) == 30 and len({each.name for each in excitations}) == 30
+    for each in excitations:
         again = Plant(model).simulate(each.trial, noise=False)
         assert is_safe(model, again), each.name
         assert 10.0 <= each.trial.duration <= 60.0
@@ -189,7 +190,7 @@ def test_the_chance_to_show_counts_sizes_in_proportion():
 
 
 def test_who_knows_nothing_is_proposed_what_moves_load_and_pressure():
-    """Of a trial at rest nearly everything is hidden: no protocol of one of both shows as much."""
+    """Of a trial at rest nearly everything is hidden: moving one of both shows less."""
     time = np.arange(0.0, 4.0, 1.0 / 64.0)
     still = Trial(time, {"motor_voltage": 0 * time + 3.0, "regulator_voltage": 0 * time + 6.0})
     measured = Plant(station()).simulate(still, seed=3)

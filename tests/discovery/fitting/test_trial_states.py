@@ -10,9 +10,9 @@ import pytest
 from pma_gym.data.datasets.dataset import NamedTrial
 from pma_gym.data.files.trial_files import write_trial
 from pma_gym.data.trial_columns import TrialError
-from pma_gym.discovery.diagnosis import TrialState
 from pma_gym.discovery.fitting.trial_states import _started, dump_states, misfits, read_states
 from pma_gym.discovery.preparation.prepared_trials import prepared
+from pma_gym.discovery.result.estimates import TrialState
 from pma_gym.discovery.workflow import refit
 from pma_gym.plant.model import dump_model, load_model, parse_model
 from tests.discovery.laboratory import STATION, diagnosed, laboratory
@@ -32,8 +32,8 @@ def back(diagnosis, trials, folder):
 
 @pytest.mark.parametrize("case", ["nothing", "parameters", "hysteresis"])
 def test_model_and_trials_read_back_give_the_misfit_that_is_printed(case, tmp_path):
-    diagnosis = diagnosed(case, 6)
-    read = back(diagnosis, laboratory(case, 6)[0], tmp_path)
+    diagnosis = diagnosed(case)
+    read = back(diagnosis, laboratory(case)[0], tmp_path)
     for signal, judged in diagnosis.adequacy.items():
         assert read[signal] == pytest.approx(diagnosis.written[signal], rel=0.01)
         assert read[signal] == pytest.approx(judged.fitted * judged.floor, rel=0.01)

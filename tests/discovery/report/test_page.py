@@ -7,8 +7,8 @@ from html.parser import HTMLParser
 import pytest
 
 from pma_gym.discovery.report.curves import worst_trial
+from pma_gym.discovery.report.effect_text import effect_equation, effect_summary
 from pma_gym.discovery.report.page import report_blocks, report_page, report_pictures
-from pma_gym.discovery.report.text import effect_equation, effect_summary
 from pma_gym.effects import CATALOGUE
 from pma_gym.pages.document import Heading, Picture, to_markdown
 

@@ -7,12 +7,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from pma_gym.discovery.diagnosis import Estimate, Moved, NamedEffect
 from pma_gym.discovery.fitting.free_parameters import FreeParameters, unit
+from pma_gym.discovery.report.figure_text import estimate_text
 from pma_gym.discovery.report.summary import print_fit
 from pma_gym.discovery.report.tables import effect_table, moved_table
-from pma_gym.discovery.report.text import estimate_text
 from pma_gym.discovery.report.verdict_text import sentence, unidentified
+from pma_gym.discovery.result.estimates import Estimate, Moved, NamedEffect
 from pma_gym.units import Quantity
 
 PURE, FORCE = "filling.exponent", "drive.offset_n"

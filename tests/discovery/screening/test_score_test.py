@@ -5,9 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pma_gym.discovery.screening import score_test
+from pma_gym.discovery.screening import probe_scores
 from pma_gym.discovery.screening.candidates import candidate_effects
-from pma_gym.discovery.screening.score_test import Baseline, screen, starting_points
+from pma_gym.discovery.screening.probe_scores import Baseline
+from pma_gym.discovery.screening.score_test import screen
+from pma_gym.discovery.screening.starting_points import starting_points
 from tests.discovery.laboratory import DELAY, HYSTERESIS, STATION, fit_problem, measured
 
 CANDIDATES = candidate_effects(STATION)
@@ -198,8 +200,8 @@ def test_probes_change_what_each_does_alone_beside_one_that_has_no_balance():
     tried[1:, shared.own.free.index("contractile_force.slope_n_per_kpa")] *= [1.01, -4.0, 0.99]
     assert whitened.columns(tried) is None
     assert whitened.balanced.tolist() == [True, True, False, True]
-    together = score_test._balanced(whitened, tried)
-    alone = score_test._one_by_one(whitened, tried)
+    together = probe_scores._balanced(whitened, tried)
+    alone = probe_scores._one_by_one(whitened, tried)
     for ours, theirs in zip(together, alone, strict=True):
         np.testing.assert_allclose(ours, theirs, rtol=1e-6, atol=1e-9)
         assert ours[1].any() and ours[3].any() and not ours[2].any()

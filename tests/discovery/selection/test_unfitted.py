@@ -5,7 +5,8 @@ from dataclasses import replace
 import pytest
 
 from pma_gym.discovery.screening.candidates import candidate_effects
-from pma_gym.discovery.screening.score_test import Baseline, screen
+from pma_gym.discovery.screening.probe_scores import Baseline
+from pma_gym.discovery.screening.score_test import screen
 from pma_gym.discovery.selection.candidate_fits import stripped, unfitted
 from tests.discovery.laboratory import STATION, fit_problem, laboratory
 

@@ -7,10 +7,10 @@ import pytest
 
 from pma_gym.data.datasets.dataset import Dataset, NamedTrial
 from pma_gym.data.trial import Trial
-from pma_gym.discovery.diagnosis import Judgement
 from pma_gym.discovery.preparation.acceptance_floors import Stated, acceptance_floors, is_summary
 from pma_gym.discovery.preparation.splits import fold_of_rows, folds
 from pma_gym.discovery.report.verdict_text import sentence
+from pma_gym.discovery.result.noise import Judgement
 from pma_gym.discovery.verdict.adequacy import MOST_EXPLAINED, Residual, adequacy
 from pma_gym.discovery.verdict.flexible_regression import Explained, explained, variables
 from pma_gym.discovery.verdict.worsened import worsened

@@ -7,10 +7,11 @@ from unittest import mock
 
 import pytest
 
-from pma_gym.discovery.diagnosis import Approximate, Estimate, Gap, NamedEffect
 from pma_gym.discovery.report.approximate_text import left_text, why_approximate
 from pma_gym.discovery.report.summary import diagnosis_summary
 from pma_gym.discovery.report.verdict_text import sentence
+from pma_gym.discovery.result.estimates import Approximate, Estimate, NamedEffect
+from pma_gym.discovery.result.misfit import Gap
 from pma_gym.discovery.verdict import approximate
 from pma_gym.discovery.verdict.approximate import LEAST_MISFIT, MOST_LEFT, closing
 from pma_gym.discovery.verdict.unknown import Reason
@@ -72,6 +73,7 @@ def test_a_share_of_hardly_anything_is_none():
     assert closing(gaps((1.0 + 0.9 * LEAST_MISFIT) ** 0.5, 1.0), ONE) is None
 
 
+@pytest.mark.campaign
 def test_an_effect_of_no_one_size_is_named_with_what_it_leaves():
     diagnosis = of_no_one_size()
     assert diagnosis.verdict == "effect", diagnosis.sentence
@@ -90,6 +92,7 @@ def test_an_effect_of_no_one_size_is_named_with_what_it_leaves():
     assert written["left"] == pytest.approx(known.left)
     assert written["closed"] == pytest.approx(1.0 - known.left)
     assert [each["name"] for each in written["effects"]] == ["hysteresis"]
+    assert "law approximate" in diagnosis_summary(diagnosis)
 
 
 def test_a_right_law_is_not_called_approximate():
@@ -100,8 +103,8 @@ def test_a_right_law_is_not_called_approximate():
 
 
 def test_an_unknown_says_its_best_candidate_with_its_size_and_what_is_left():
-    diagnosis = of_no_one_size()
-    left = replace(diagnosis.approximate, left=0.35)
+    diagnosis = diagnosed("hysteresis")
+    left = Approximate(diagnosis.effects, 0.35, True)
     reason = Reason("slow", 0.4, 0.35, ("hysteresis",), leaves=0.4)
     said = sentence(replace(diagnosis, verdict="unknown", effects=(), approximate=left), reason)
     assert "that no effect of the catalogue carries" in said
@@ -126,7 +129,3 @@ def test_two_laws_are_both_approximate():
     two = tuple(NamedEffect(name, (), 0.001, size) for name in ("hysteresis", "creep"))
     assert left_text(Approximate(two, 0.3, True)).startswith("laws approximate, 30 %")
     assert "left out" not in left_text(Approximate(two, 0.3, False))
-
-
-def test_the_summary_says_so_too():
-    assert "law approximate" in diagnosis_summary(of_no_one_size())

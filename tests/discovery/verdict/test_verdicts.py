@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from pma_gym.data.trial import Trial
-from pma_gym.discovery.diagnosis import NextExperiment
 from pma_gym.discovery.report.verdict_text import sentence
+from pma_gym.discovery.result.next_experiment import NextExperiment, proposed_excitation
 from pma_gym.discovery.screening.autocorrelation import SURE, AutocorrelationTest
 from pma_gym.discovery.verdict import decision, unknown
 from pma_gym.discovery.verdict.adequacy import Adequacy
@@ -412,4 +412,7 @@ def test_old_names_of_the_answer_are_read_with_a_warning():
     assert len(said) == 1 and said[0].filename == __file__
     following = NextExperiment("a ramp", ("creep",), 30.0, 1.0, laboratory("nothing")[0][0])
     with pytest.warns(DeprecationWarning, match=r"NextExperiment\.protocol is now excitation"):
-        assert following.protocol == "a ramp"
+        assert getattr(following, "protocol") == "a ramp"  # noqa: B009
+    written = following.document()
+    assert proposed_excitation(written) == written["excitation"] == "a ramp"
+    assert proposed_excitation({"protocol": "a ramp"}) == "a ramp"

@@ -1,7 +1,7 @@
 """Headers of a Parquet file's pages: how much each unpacks to, before it is unpacked.
 
 pyarrow unpacks by what the pages declare, and its own description of a damaged file may end the
-process. Source: Apache Parquet, `parquet.thrift`; Apache Thrift, compact protocol.
+process. Source: Apache Parquet, `parquet.thrift`; Apache Thrift, compact schedule.
 """
 
 from collections.abc import Iterator

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from pma_gym.data.signals import SIGNALS, Signal
 from pma_gym.metrics import PHASE_DURATION, PHASE_SAMPLES, SAMPLE_RATE_HZ
 from pma_gym.pickling import Packed, packed
+from pma_gym.renamed_names import renamed_names
 from pma_gym.units import SI_FACTORS
 
 _MM = SI_FACTORS["mm"]
@@ -41,7 +42,7 @@ class Phase:
         duration: how long it lasts (s).
         initial: ideal position at its start (m or rad).
         slope: ideal speed (m/s or rad/s); of a motion, the mean one.
-        motion: ideal position by the trial's time, the same function for all phases of a protocol;
+        motion: ideal position by the trial's time, the same function for all phases of a schedule;
             None where it is the line of `initial` and `slope`.
     """
 
@@ -88,8 +89,8 @@ class Phase:
 
 
 @dataclass(frozen=True)
-class Protocol:
-    """A task: which quantity has to follow which reference.
+class TrialSchedule:
+    """What a trial asks for: the quantity that follows a reference, phase by phase.
 
     Attributes:
         name: how the task is called.
@@ -196,7 +197,7 @@ class Protocol:
         return float(self.reference(time))
 
 
-DISPLACEMENT = Protocol(
+DISPLACEMENT = TrialSchedule(
     name="displacement",
     quantity="extension",
     unit="mm",
@@ -205,7 +206,7 @@ DISPLACEMENT = Protocol(
 )
 """Isokinetic displacement: y = 5 mm/s * t for 5 s (Serres 2008, section 4.2.3, tables 20-22)."""
 
-ROTATION = Protocol(
+ROTATION = TrialSchedule(
     name="rotation",
     quantity="rotation",
     unit="deg",
@@ -219,5 +220,7 @@ ROTATION = Protocol(
 """Isokinetic rotation: 0 to 90 deg in 5 s, 5 s there, back in 5 s (Serres 2008, section 4.3.1,
 tables 24-30)."""
 
-PROTOCOLS = {protocol.name: protocol for protocol in (DISPLACEMENT, ROTATION)}
+SCHEDULES = {schedule.name: schedule for schedule in (DISPLACEMENT, ROTATION)}
 """The dissertation's two by name."""
+
+__getattr__ = renamed_names(__name__, {"Protocol": TrialSchedule, "PROTOCOLS": "SCHEDULES"})

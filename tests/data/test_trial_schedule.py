@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from pma_gym.data.protocol import DISPLACEMENT, PROTOCOLS, ROTATION, Phase, Protocol
+from pma_gym.data.trial_schedule import DISPLACEMENT, ROTATION, SCHEDULES, Phase, TrialSchedule
 from pma_gym.metrics import phase_times
 from pma_gym.units import SI_FACTORS
 
@@ -29,24 +29,24 @@ def test_shape_is_kept():
     assert ROTATION.reference(1.0).shape == ()
 
 
-@pytest.mark.parametrize("protocol", PROTOCOLS.values(), ids=PROTOCOLS)
-def test_phases_join_and_follow_their_lines(protocol):
+@pytest.mark.parametrize("schedule", SCHEDULES.values(), ids=SCHEDULES)
+def test_phases_join_and_follow_their_lines(schedule):
     end = 0.0
-    for index, phase in enumerate(protocol.phases):
+    for index, phase in enumerate(schedule.phases):
         assert phase.start == end == phase_times(index)[0]
         end += phase.duration
         own = np.linspace(0, phase.duration, 11)
-        assert_allclose(protocol.reference(phase.start + own), phase.reference(own), atol=1e-15)
-    assert np.ptp(protocol.reference(np.linspace(0, end, 16))) == pytest.approx(protocol.span)
-    assert protocol.unit in SI_FACTORS
+        assert_allclose(schedule.reference(phase.start + own), phase.reference(own), atol=1e-15)
+    assert np.ptp(schedule.reference(np.linspace(0, end, 16))) == pytest.approx(schedule.span)
+    assert schedule.unit in SI_FACTORS
 
 
 def test_a_motion_is_the_reference_of_its_phases_and_held_at_its_ends():
     phases = tuple(Phase(n, s, 2.0, 0.0, 0.0, np.square) for n, s in (("I", 0.0), ("II", 2.0)))
-    protocol = Protocol("bow", "extension", "mm", 16.0, phases)
-    assert protocol.motion is np.square and protocol.duration == 4.0
-    assert_allclose(protocol.reference(np.array([-1.0, 0.0, 3.0, 9.0])), [0.0, 0.0, 9.0, 16.0])
-    assert [protocol.at(t) for t in (-1, 0.0, 3.0, 9.0)] == [0.0, 0.0, 9.0, 16.0]
+    schedule = TrialSchedule("bow", "extension", "mm", 16.0, phases)
+    assert schedule.motion is np.square and schedule.duration == 4.0
+    assert_allclose(schedule.reference(np.array([-1.0, 0.0, 3.0, 9.0])), [0.0, 0.0, 9.0, 16.0])
+    assert [schedule.at(t) for t in (-1, 0.0, 3.0, 9.0)] == [0.0, 0.0, 9.0, 16.0]
     assert_allclose(phases[1].reference(np.array([0.0, 1.0, 2.5])), [4.0, 9.0, 20.25])
     assert [ROTATION.at(t) for t in (2.0, 16.0)] == ROTATION.reference([2.0, 16.0]).tolist()
 
@@ -62,7 +62,7 @@ def test_a_motion_is_the_reference_of_its_phases_and_held_at_its_ends():
 )
 def test_phases_that_do_not_belong_together_are_refused(phases, words):
     with pytest.raises(ValueError, match=words):
-        Protocol("broken", "extension", "mm", 1.0, phases)
+        TrialSchedule("broken", "extension", "mm", 1.0, phases)
 
 
 def test_a_phase_has_two_samples_more_than_its_duration():

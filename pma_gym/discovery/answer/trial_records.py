@@ -7,8 +7,9 @@ from numpy.typing import NDArray
 
 from pma_gym.data.trial import MEASUREMENTS
 from pma_gym.data.trial_columns import BY_QUANTITY
-from pma_gym.discovery.diagnosis import Floor, Gap, Judgement, TrialRecord
 from pma_gym.discovery.fitting.free_parameters import values
+from pma_gym.discovery.result.misfit import Gap, TrialRecord
+from pma_gym.discovery.result.noise import Floor, Judgement
 from pma_gym.discovery.verdict.findings import Findings
 from pma_gym.estimation.logged import Logged
 from pma_gym.units import SI_FACTORS

@@ -1,0 +1,1 @@
+"""The diagnosis as it is handed out: put together from what the steps computed."""

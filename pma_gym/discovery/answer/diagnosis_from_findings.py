@@ -1,0 +1,190 @@
+"""Everything that a diagnosis says, from what its steps found."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pma_gym.data.trial_columns import BY_QUANTITY
+from pma_gym.discovery.answer.candidate_list import candidate_list
+from pma_gym.discovery.answer.estimates import selected_effects
+from pma_gym.discovery.answer.experiment_choice import proposed_experiment
+from pma_gym.discovery.answer.own_parameters import (
+    moved_parameters,
+    not_identifiable,
+    parameters_off,
+)
+from pma_gym.discovery.answer.proposed_model import amended_model, proposal
+from pma_gym.discovery.answer.reader_warnings import approximate_law_warnings, reader_warnings
+from pma_gym.discovery.answer.trial_records import (
+    floors_in_file_units,
+    gaps,
+    judgements,
+    trial_records,
+)
+from pma_gym.discovery.diagnosis import Diagnosis, Verdict
+from pma_gym.discovery.fitting.trial_states import misfits, trial_states
+from pma_gym.discovery.preparation.quantisation import coarse_sensors
+from pma_gym.discovery.report.noise_text import nuisances
+from pma_gym.discovery.report.verdict_text import sentence, steps
+from pma_gym.discovery.result.estimates import Approximate, Moved, NamedEffect
+from pma_gym.discovery.result.misfit import ResidualLaw, TrialRecord
+from pma_gym.discovery.screening.localisation import localise
+from pma_gym.discovery.screening.residuals import residuals
+from pma_gym.discovery.verdict.approximate import MOST_SCATTER, closing
+from pma_gym.discovery.verdict.decision import verdict_of
+from pma_gym.discovery.verdict.findings import Findings
+from pma_gym.discovery.verdict.residual_fraction import ResidualFraction, residual_fraction, tones
+from pma_gym.discovery.verdict.residual_laws import residual_law
+from pma_gym.discovery.verdict.unknown import (
+    Reason,
+    shapeless_laws,
+    telling,
+    why_unknown,
+    widest_scatter,
+)
+from pma_gym.discovery.verdict.worsened import worsened
+
+Progress = Callable[[str, int, int], None]
+
+
+def diagnosis_from_findings(findings: Findings, tell: Progress, propose: bool = True) -> Diagnosis:
+    """The diagnosis, with the next experiment if one is to be proposed."""
+    tell("putting the answer together", 0, 3)
+    left = residual_fraction(findings)
+    decision = _decision(findings, left)
+    verdict, unknown = decision.verdict, decision.unknown
+    model = amended_model(findings, verdict)
+    tell("putting the answer together", 1, 3)
+    where, maps = localise(
+        findings.problem.whitened_residuals(findings.refitted.model),
+        findings.refitted,
+        np.array([floor.level for floor in findings.floors]),
+        findings.seed,
+    )
+    states = trial_states(*proposal(findings, verdict), [each.name for each in findings.named])
+    tell("putting the answer together", 2, 3)
+    hidden = decision.not_detectable
+    diagnosis = Diagnosis(
+        verdict=verdict,
+        sentence="",
+        where=where,
+        effects=decision.effects,
+        parameters=decision.parameters,
+        gap=gaps(decision.records),
+        candidates=candidate_list(findings),
+        next_experiment=proposed_experiment(findings, verdict, hidden) if propose else None,
+        model=model,
+        given=findings.given,
+        not_identifiable={
+            path: why
+            for path, why in not_identifiable(findings, findings.selection.fit).items()
+            if path not in decision.parameters
+        },
+        not_detectable=hidden,
+        approximate=decision.approximate,
+        law=decision.law,
+        tones=tones(findings) if verdict == "unknown" else {},
+        floors=floors_in_file_units(findings),
+        nuisances=nuisances(findings),
+        adequacy=judgements(findings),
+        trials=decision.records,
+        states=states,
+        written=misfits(findings.named, model, states),
+        maps=maps,
+        warnings=(*reader_warnings(findings), *approximate_law_warnings(verdict, unknown)),
+        converged=findings.proposed[1].converged,
+        worsened=_worsened(findings, verdict, decision.records),
+    )
+    reason = unknown if verdict == "unknown" else None
+    return replace(
+        diagnosis, sentence=sentence(diagnosis, reason), steps=steps(findings, diagnosis, left)
+    )
+
+
+@dataclass(frozen=True)
+class _Decision:
+    """The verdict and what it rests on.
+
+    Attributes:
+        verdict: the verdict.
+        unknown: why structure is missing that no effect of the catalogue carries; None: none is.
+        effects: what is missing; empty unless the verdict is `effect`.
+        parameters: the model's own that moved.
+        not_detectable: effects that would not have shown at their usual size.
+        approximate: effects whose law is only approximate.
+        law: the residual law.
+        records: curves and gaps of each trial.
+    """
+
+    verdict: Verdict
+    unknown: Reason | None
+    effects: tuple[NamedEffect, ...]
+    parameters: Mapping[str, Moved]
+    not_detectable: tuple[str, ...]
+    approximate: Approximate | None
+    law: ResidualLaw | None
+    records: tuple[TrialRecord, ...]
+
+
+def _decision(findings: Findings, left: ResidualFraction) -> _Decision:
+    """Decide the verdict; `left` is what the proposed model leaves of what is slow."""
+    coarse = coarse_sensors(findings.floors, _misfits(findings))
+    laws = shapeless_laws(findings, left)
+    not_detectable = tuple(
+        score.candidate.name
+        for score in findings.scores
+        if score.resolvable is None or score.resolvable > 1.0
+    )
+    parameters = (
+        moved_parameters(findings, findings.selection.fit)
+        if findings.elimination is None
+        else parameters_off(findings, findings.elimination.fit)
+    )
+    off = any(moved.significant for moved in parameters.values())
+    unknown = why_unknown(findings, left, laws)
+    verdict = verdict_of(findings, unknown, not_detectable, bool(coarse), off)
+    records = trial_records(findings)
+    closes = closing(gaps(records), unknown.effects) if unknown and unknown.effects else None
+    if closes is not None and closes.named and widest_scatter(findings) <= MOST_SCATTER:
+        # An approximate law is a name where a right one would be; else the verdict stays.
+        named = verdict_of(findings, None, not_detectable, bool(coarse), off)
+        verdict = named if named == "effect" else verdict
+    approximate = None
+    if closes is not None and closes.worth_saying:
+        approximate = Approximate(selected_effects(findings), closes.left, closes.held_out)
+    return _Decision(
+        verdict,
+        unknown,
+        (*selected_effects(findings), *coarse) if verdict == "effect" else (),
+        parameters,
+        not_detectable,
+        approximate,
+        residual_law(laws[0]) if unknown is not None and telling(findings, laws) else None,
+        records,
+    )
+
+
+def _misfits(findings: Findings) -> list[float]:
+    """What the refitted model leaves of each output (root mean square, SI), NaN if not measured."""
+    left = residuals(
+        findings.problem.whitened_residuals(findings.refitted.model), findings.refitted
+    )
+    joined = [np.concatenate([part[channel] for part in left]) for channel in range(len(left[0]))]
+    known = [values[np.isfinite(values)] for values in joined]
+    return [float(np.sqrt(np.mean(each**2))) if each.size else np.nan for each in known]
+
+
+def _worsened(
+    findings: Findings, verdict: Verdict, records: Sequence[TrialRecord]
+) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """What the proposed model fits worse than the given one; nothing where none is proposed."""
+    if verdict not in ("effect", "parameters"):
+        return (), ()
+    levels = {
+        BY_QUANTITY[name].name: findings.adequacy.signals[name].floor
+        for name in findings.adequacy.signals
+    }
+    floors = {floor.signal.column: floor.level for floor in findings.floors}
+    floors |= {signal: floor.level for signal, floor in levels.items() if floor is not None}
+    return worsened(records, floors, findings.seed)

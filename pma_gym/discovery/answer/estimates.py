@@ -1,0 +1,98 @@
+"""Estimates and their intervals, from the fits of a diagnosis."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from pma_gym.discovery.fitting.fit_problem import Fitted
+from pma_gym.discovery.fitting.free_parameters import unit
+from pma_gym.discovery.result.estimates import Estimate, NamedEffect
+from pma_gym.discovery.screening.score_test import ScreeningScore
+from pma_gym.discovery.selection.forward_selection import Stage
+from pma_gym.discovery.verdict.findings import Findings
+
+AT_LIMIT = 1e-6
+"""Distance from an end of a range, as a share of the range, within which a value is at that end."""
+
+BOUNDLESS = 1e3
+"""Times the lower end of a positive range that count for its width, where it is wider."""
+
+
+def selected_effects(findings: Findings) -> tuple[NamedEffect, ...]:
+    """The effects that were selected."""
+    fit, effects = findings.selection.fit, []
+    for place, candidate in enumerate(findings.selection.chosen):
+        stage = findings.selection.stages[min(place, len(findings.selection.stages) - 1)]
+        score = next(each for each in stage.scores if each.candidate.name == candidate.name)
+        equal = [rival.candidate.name for rival in findings.rivals[place] if rival.equal]
+        effects.append(
+            NamedEffect(
+                name=candidate.name,
+                confused_with=tuple(equal),
+                p_value=_p_value(stage, score),
+                parameters={
+                    path.partition(".")[2]: estimate(findings, fit, path)
+                    for path in candidate.fitted_paths
+                },
+                undetermined={
+                    path.partition(".")[2]: findings.selection.undetermined[path]
+                    for path in candidate.left
+                },
+            )
+        )
+    return tuple(effects)
+
+
+def _p_value(stage: Stage, score: ScreeningScore) -> float:
+    """Family-wise p-value of the fit of a named effect, or what opened the gate for it."""
+    fit = stage.fits.get(score.candidate.name)
+    if fit is None or stage.scan.excess:
+        return score.p_value
+    return score.p_value_of(stage.before.chi_square - fit.chi_square)
+
+
+def estimate(findings: Findings, fit: Fitted, path: str) -> Estimate:
+    """A parameter's value and 95 % interval, within its bounds."""
+    value, error = value_and_error(findings, fit, path)
+    lower, upper = _bounds(findings, fit)[path]
+    limit = at_limit(value, lower, upper)
+    if not np.isfinite(error):
+        return Estimate(value, None, None, unit(path), limit)
+    low, high = max(value - 1.96 * error, lower), min(value + 1.96 * error, upper)
+    # A range may be a million times as wide as what a light axis has: what is surely off an end of
+    # it is not at that end.
+    limit = "" if lower < low and high < upper else limit
+    return Estimate(value, low, high, unit(path), limit)
+
+
+def at_limit(value: float, lower: float, upper: float) -> str:
+    """Which end of its range a value is at: `lower`, `upper`, or none: empty."""
+    reach = AT_LIMIT * (upper - lower)
+    if value >= upper - reach:
+        return "upper"
+    # An upper end that is never reached says nothing of how near the lower one is.
+    least = min(reach, BOUNDLESS * AT_LIMIT * lower) if lower > 0.0 else reach
+    return "lower" if value <= lower + least else ""
+
+
+def _bounds(findings: Findings, fit: Fitted) -> Mapping[str, tuple[float, float]]:
+    """What the fit allows each of its parameters."""
+    problem = findings.selection.problem
+    if findings.elimination is not None and fit is findings.elimination.fit:
+        problem = findings.elimination.problem
+    chosen = findings.selection.chosen if fit is findings.selection.fit else ()
+    whitened = problem.whitened_at(fit, chosen)
+    pairs = zip(whitened.lower.tolist(), whitened.upper.tolist(), strict=True)
+    return dict(zip((free.path for free in whitened.free), pairs, strict=True))
+
+
+def value_and_error(findings: Findings, fit: Fitted, path: str) -> tuple[float, float]:
+    """A parameter's value and its standard error.
+
+    Of the fewest that explain the trials, the error is no smaller than with all parameters free:
+    that the others are exactly as they were given is likely, not known.
+    """
+    value, error = fit.estimate(path)
+    if findings.elimination is not None:
+        error = float(np.maximum(error, findings.selection.fit.estimate(path)[1]))
+    return value, error

@@ -1,0 +1,1 @@
+"""The parts of a diagnosis: data classes, and how each stands in `diagnosis.json`."""
