@@ -1,4 +1,4 @@
-"""What is simplified while a graph is built.
+"""Simplifications of a graph while it is built.
 
 All of it keeps every bit of a finite result in double precision, except the sign of a zero and
 one rule, the reciprocal:
@@ -78,7 +78,7 @@ def compute(operation: str, kind: str, numbers: list) -> Any:  # noqa: ANN401
 
 
 def simplify(graph: ValueGraph, operation: str, operands: tuple[Value, ...]) -> Value | None:
-    """A simpler value for an operation, or None if it is to be left as it is."""
+    """Return a simpler value for an operation, or None if there is none."""
     if all(operand.is_constant for operand in operands):
         numbers = [operand.data for operand in operands]
         kind = operands[-1].kind

@@ -27,7 +27,7 @@ def where(condition: Any, yes: Any, no: Any) -> Any:  # noqa: ANN401
 
 
 def sloping(value: Any, argument: Any, slope: Any) -> Any:  # noqa: ANN401
-    """The value as it is; of traced ones, its derivative by the argument is kept with the graph."""
+    """Return the value unchanged; for a traced value, store its derivative by the argument."""
     if isinstance(value, Value) and isinstance(argument, Value):
         value.graph.slopes[value.id] = argument, value.graph.value(slope)
     return value

@@ -1,8 +1,8 @@
-"""Arithmetic as a graph: what a law computes when it is called on values instead of numbers.
+"""Expression graphs: the arithmetic of a law that is called with symbolic values.
 
-A `Value` stands for one number of a calculation that is yet to run. Arithmetic on values makes more
-values; equal arithmetic makes the same value, so that nothing is computed twice. What is computed
-is what was written, rounding by rounding, with the exceptions that `folding` lists.
+A `Value` is one number of a later calculation. Arithmetic on values makes more values; equal
+arithmetic makes the same value, so that nothing is computed twice. The calculation has the
+roundings of the law's text, with the exceptions that `folding` lists.
 """
 
 import struct
@@ -48,8 +48,7 @@ class Graph(ValueGraph):
 
     Attributes:
         values: the values, in order of `Value.id`.
-        slopes: what a value's derivative is known to be: the value that it is by, and the
-            derivative, by the value's id.
+        slopes: known derivatives, keyed by the value's id: the argument and the derivative.
     """
 
     def __init__(self) -> None:
@@ -58,7 +57,7 @@ class Graph(ValueGraph):
         self._known: dict[tuple, Value] = {}
 
     def input(self, name: str, level: int, kind: Kind = "real") -> Value:
-        """A value that is given when the calculation runs.
+        """Make an input of the calculation.
 
         Args:
             name: its name; the same name and kind is the same input.
@@ -75,7 +74,7 @@ class Graph(ValueGraph):
         return value
 
     def inputs(self, name: str, like: Any, level: int = FIXED) -> Any:  # noqa: ANN401
-        """The same named tuple with an input for each number.
+        """Make a named tuple of inputs, one for each number of another named tuple.
 
         Args:
             name: what the names of the inputs begin with: name.field, and name.field[0] in rows.
@@ -91,7 +90,7 @@ class Graph(ValueGraph):
         return like._replace(**{f: one(f"{name}.{f}", v) for f, v in like._asdict().items()})
 
     def constant(self, number: Number, kind: Kind = "real") -> Value:
-        """A number, as a value; an integer keeps its lowest 64 bits."""
+        """Make a constant from a number; an integer keeps its lowest 64 bits."""
         if kind == "real":
             number = float(number)
             key = struct.pack("<d", number)
@@ -108,7 +107,7 @@ class Graph(ValueGraph):
         return value
 
     def value(self, given: "Value | Number", kind: Kind = "real") -> Value:
-        """The value itself, or the number as a constant of this kind.
+        """Return a value unchanged, or a number as a constant of this kind.
 
         Raises:
             ValueError: a value of another graph.
@@ -120,7 +119,7 @@ class Graph(ValueGraph):
         return given
 
     def apply(self, operation: str, *operands: Value) -> Value:
-        """The value of an operation, simplified; the operators of `Value` come here.
+        """Make the simplified value of an operation; the operators of `Value` call this.
 
         Raises:
             TypeError: operands of a kind that the operation does not take.
@@ -130,7 +129,7 @@ class Graph(ValueGraph):
         return self.node(operation, operands, kind) if simple is None else simple
 
     def node(self, operation: str, operands: tuple[Value, ...], kind: Kind) -> Value:
-        """The value of exactly this operation, as `simplify` wants it left."""
+        """Make the value of an operation without simplification."""
         key = (operation, *[operand.id for operand in operands])
         value = self._known.get(key)
         if value is None:

@@ -1,4 +1,4 @@
-"""Runs the text of a law on other kinds of number: NumPy arrays, SymPy expressions.
+"""Evaluation of a law with other kinds of number: NumPy arrays, SymPy expressions.
 
 A law calls nothing but the functions of `pma_gym.effects.arithmetic`; binding those anew gives the
 same law for another kind of number, without a second copy of it.
@@ -11,7 +11,7 @@ import numpy as np
 
 
 def rebind(function: Callable, names: Mapping[str, Callable]) -> Callable:
-    """The same function, with the functions of these names replaced wherever it calls them.
+    """Return a copy of a function in which the calls of given names are replaced.
 
     Args:
         function: a law, or a generated function that calls laws.
@@ -43,7 +43,7 @@ def _rebind(
 
 
 def as_numpy(function: Callable) -> Callable:
-    """The same law for NumPy arrays.
+    """Return a law for NumPy arrays.
 
     >>> from pma_gym.effects.arithmetic import clip
     >>> as_numpy(clip)(np.array([-1.0, 0.5, 2.0]), 0.0, 1.0).tolist()

@@ -1,4 +1,4 @@
-"""The same arithmetic on other inputs."""
+"""Substitution of values in traced arithmetic."""
 
 from collections.abc import Mapping, Sequence
 
@@ -7,7 +7,7 @@ from pma_gym.codegen.trace import order
 
 
 def substitute(outputs: Sequence[Value], given: Mapping[int, Value]) -> list[Value]:
-    """What the outputs would be if some values were others.
+    """Return the outputs with some values replaced by others.
 
     Args:
         outputs: traced values.

@@ -1,8 +1,8 @@
-"""Sums as compiled code makes them: products fused in, terms added as they come to be there.
+"""Order of sums in compiled code: products are fused, terms are added in order of availability.
 
-A processor waits some four cycles before it can use a sum or a product, and has time for eight
-others meanwhile. A step of a plant is one long chain of results that wait for each other. So what
-is a sum of sums is taken as one sum of many terms, and what is late is added last.
+A sum or product has a latency of about four cycles, in which the processor could start eight
+others. A step of a plant is one long chain of dependent results. Nested sums therefore become one
+sum of many terms, and the terms with the latest results are added last.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pma_gym.codegen.graph import Value
 
 WAIT, WAITS = 4, {"divide": 14, "square_root": 18}
-"""Cycles until a result can be used: about those of the last ten years' processors."""
+"""Latency of a result in cycles: about that of the last ten years' processors."""
 
 
 @dataclass(frozen=True)

@@ -1,1 +1,1 @@
-"""Compiled code on disk: where it is kept, who may have written it, who signed it."""
+"""Cache of compiled code on disk: location, permissions and signatures."""

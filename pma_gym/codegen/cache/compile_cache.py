@@ -1,8 +1,8 @@
-"""Where compiled code is kept, and under which name.
+"""Cache of compiled code: its folder and its entries.
 
-The folder is the user's own, as a compiler's output is: whoever may write there decides what runs.
-So a folder that others own or may write is not used, and every entry carries a signature by a key
-of this user; what is damaged, or signed by nobody here, is compiled anew instead of run.
+The folder is private to the user, because whoever can write to it decides what runs. A folder that
+others own or can write to is not used, and every entry has a signature by a key of this user. A
+damaged entry, or one without a valid signature, is compiled again and never run.
 """
 
 import hashlib
@@ -39,8 +39,8 @@ class _Store:
 def cache_directory() -> Path | None:
     """Folder of compiled plants: $PMA_GYM_CACHE, else the user's cache folder.
 
-    Falls back to a temporary folder of this process, and says so once, where that cannot be made
-    or written, or where others may write it; None where there is no temporary folder either.
+    If that folder cannot be created or written, or others can write to it, this is a temporary
+    folder of the process, with one warning; None if there is no temporary folder either.
     """
     store = _store()
     return None if store is None else store.folder.parent
@@ -92,13 +92,13 @@ def _temporary() -> _Store | None:
 
 
 def digest(parts: Iterable[str]) -> str:
-    """A name for what is made from these texts."""
+    """Name of an entry that depends on these texts."""
     return hashlib.sha256("\0".join(parts).encode()).hexdigest()
 
 
 @cache
 def source_digest() -> str:
-    """A hash of the texts of all modules that compiled code is written by."""
+    """Hash of the source of all modules that generate compiled code."""
     package, total = Path(__file__).parents[2], hashlib.sha256()
     # All below the environments: what a kernel is written by reaches from laws to calibrations.
     for path in sorted(package.glob("**/*.py")):
@@ -110,11 +110,11 @@ def source_digest() -> str:
 
 
 def load(name: str) -> bytes | None:
-    """What is kept under a name.
+    """Load the entry with a name.
 
     Returns:
-        Its content; None if there is nothing, or if it is damaged, not signed by this user's key,
-        or written by another user.
+        Its content; None if there is no entry, or if it is damaged, not signed with this user's
+        key, or written by another user.
     """
     store = _store()
     if store is None:
@@ -132,7 +132,7 @@ def load(name: str) -> bytes | None:
 
 
 def keep(name: str, body: bytes) -> None:
-    """Keep something under a name, if there is room."""
+    """Store an entry under a name, if there is space."""
     with suppress(OSError):
         try:
             _write(name, body)

@@ -1,4 +1,4 @@
-"""Signatures of compiled code: only what this user's key has signed is run.
+"""Signatures of compiled code: only code signed with this user's key is run.
 
 The key is random, of this user, and lies beside the code with mode 0600. A signature covers the
 name too, so that no entry can stand in for another.
@@ -26,14 +26,14 @@ def signature(key: bytes, name: str, body: bytes) -> bytes:
 
 
 def is_signed(key: bytes, name: str, body: bytes, signed: bytes) -> bool:
-    """Whether a signature is that of an entry."""
+    """Whether a signature is valid for an entry."""
     return hmac.compare_digest(signature(key, name, body), signed)
 
 
 def user_key(folder: Path) -> bytes:
-    """The key in a folder; made there if there is none, or none that is secret.
+    """Return the key in a folder; create it if there is none, or none that is secret.
 
-    Processes that make it at the same time get the same one.
+    Processes that create it at the same time get the same key.
 
     Args:
         folder: one that this user alone may write.

@@ -1,8 +1,8 @@
-"""What this user alone may have written: folders and files that compiled code may come from.
+"""Checks that folders and files of compiled code are private to the user.
 
-Whoever can write machine code where this process loads it decides what this process does. So a
-folder or file counts only if the user of this process owns it and nobody else may write it. Where
-the system has no owners of this kind (Windows), the user's profile is protected by the system.
+Whoever can write machine code that this process loads decides what the process does. A folder or
+file is therefore accepted only if the user of this process owns it and nobody else can write it. On
+systems without such owners (Windows), the system protects the user's profile.
 """
 
 import os
@@ -29,7 +29,7 @@ class UntrustedError(OSError):
 
 
 def private_folder(folder: Path, link: bool) -> None:
-    """Make a folder of this user alone, or check that it is one.
+    """Create a private folder of this user, or check that an existing one is private.
 
     The folders above it do not matter: what another user puts in its place is not owned by this
     user, and every file is checked once more when it is open.
@@ -63,7 +63,7 @@ def private_folder(folder: Path, link: bool) -> None:
 
 
 def read_trusted(path: Path, secret: bool = False) -> bytes:
-    """Content of a file that this user alone may have written.
+    """Read a file that only this user can have written.
 
     Args:
         path: the file; no link.

@@ -1,8 +1,7 @@
-"""Where compiled code finds what an array of NumPy holds.
+"""Memory layout of NumPy's array object, for compiled code.
 
-The first members of NumPy's array object have lain where they do since its version 1.0, and every
-compiled extension reads them there. Whether they do is looked at all the same, on arrays that are
-made for it: where they lie elsewhere nobody reads them.
+The offsets of its first members are the same since NumPy 1.0, and every compiled extension uses
+them. `are_known` checks them on test arrays; if they differ, compiled code does not use them.
 """
 
 import ctypes
@@ -11,15 +10,15 @@ from functools import cache
 import numpy as np
 
 DIMENSIONS, SIZES, STRIDES, DATA, DTYPE, TYPE = 24, 32, 40, 16, 56, 8
-"""Bytes from an array's beginning to its number of dimensions, their sizes and strides, the address
-of its data, its dtype, and its own type, as 64-bit CPython has them."""
+"""Byte offsets in an array object of its number of dimensions, sizes, strides, data address, dtype
+and type, in 64-bit CPython."""
 
 _END = 64
 
 
 @cache
 def are_known() -> bool:
-    """Whether arrays are laid out so."""
+    """Whether arrays have this layout."""
     # No member is looked at beyond an object's end.
     if np.ndarray.__basicsize__ < _END or ctypes.sizeof(ctypes.c_void_p) != 8:
         return False

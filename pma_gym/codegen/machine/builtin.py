@@ -1,4 +1,4 @@
-"""Compiled functions that Python calls as its own builtins.
+"""Compiled functions as Python builtins.
 
 A call through ctypes costs as much as a tenth of a control step, and numbers that Python puts into
 a dictionary cost more. A function that is called as `len` is, and makes its result by Python's C
@@ -51,7 +51,7 @@ def addresses() -> dict[str, int]:
 
 
 def builtin(address: int, name: str, bound: object) -> Callable[[Any], Any]:
-    """A compiled function as a builtin of one argument.
+    """Make a builtin of one argument from a compiled function.
 
     Args:
         address: of a function of two pointers, `bound` and the argument, which returns a new

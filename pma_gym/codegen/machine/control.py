@@ -1,4 +1,4 @@
-"""Functions, loops and memory in LLVM, to be written by hand around `SimdEmitter.emit`."""
+"""Functions, loops and memory access in LLVM, for code around `SimdEmitter.emit`."""
 
 import sys
 from collections.abc import Callable, Iterator, Sequence
@@ -127,7 +127,7 @@ def loop(
 
 @contextmanager
 def repeat(builder: Builder) -> Iterator[Callable[[Operand], None]]:
-    """Write a loop without end; yields a function that writes a way out where a truth holds.
+    """Write an endless loop; yields a function that writes an exit on a condition.
 
     >>> builder, _ = function(ir.Module(), "f", [])
     >>> count = variable(builder, INTEGER, integer(0))
@@ -152,9 +152,9 @@ def repeat(builder: Builder) -> Iterator[Callable[[Operand], None]]:
 
 @contextmanager
 def wait(builder: Builder) -> Iterator[Callable[[Operand], None]]:
-    """Write a loop as `repeat` does, which waits for other threads.
+    """Write a loop as `repeat` that waits for other threads.
 
-    After some ten microseconds it lets others have the processor: whom it waits for may need it.
+    After about ten microseconds it yields the processor, which the other thread may need.
     """
     looks = variable(builder, INTEGER, integer(0))
     with repeat(builder) as leave_if:
@@ -167,7 +167,7 @@ def wait(builder: Builder) -> Iterator[Callable[[Operand], None]]:
 
 
 LOOKS = 10_000
-"""Looks at what another thread does before the processor is given away."""
+"""Number of checks before a waiting thread yields the processor."""
 
 
 def _external(module: ir.Module, name: str, returns: ir.Type) -> Operand:

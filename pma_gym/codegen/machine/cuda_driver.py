@@ -1,7 +1,6 @@
-"""NVIDIA's driver, called directly: compiles PTX for the GPU at hand and launches it.
+"""Interface to NVIDIA's driver: compile PTX for the present GPU and launch it.
 
-No CUDA toolkit is needed. What runs on a GPU runs in the context that PyTorch uses too, so that
-both see the same memory.
+No CUDA toolkit is needed. Kernels run in PyTorch's context, so that both share memory.
 """
 
 import ctypes
@@ -31,11 +30,11 @@ INSTEAD = (
     "without one the processor does the same: gym.make_vec(id, num_envs=n, "
     'vectorization_mode="vector_entry_point", threads=8)'
 )
-"""What to do where there is no GPU."""
+"""Fix for a missing GPU, for messages."""
 
 
 class GpuError(RuntimeError):
-    """No GPU to be used, or one that refuses; says what is missing and what to do."""
+    """No usable GPU, or an error of one; the message has the cause and the fix."""
 
 
 class Driver:

@@ -1,4 +1,4 @@
-"""Compiles LLVM modules for the processor at hand, keeps the result on disk, and calls it."""
+"""Compile LLVM modules for the present processor, cache the result on disk, and call it."""
 
 import ctypes
 import gc
@@ -20,9 +20,9 @@ if TYPE_CHECKING:
 _OPTIMISATION = 3
 
 _PASSES = ("sroa", "new_gvn", "instruction_combine", "simplify_cfg")
-"""LLVM's passes. What is to be compiled is straight arithmetic, with vectors, constants and choices
-as they should be: all passes take 0.25 s more for an environment and gain nothing (0.98 to 1.02 of
-the time of a step in a batch and alone; EPYC, Zen 3, interleaved)."""
+"""LLVM's passes. The code is straight-line arithmetic that is already vectorised and simplified:
+all passes take 0.25 s more for an environment without a gain (0.98 to 1.02 of the time of a step,
+in a batch and for a single environment; EPYC, Zen 3, interleaved)."""
 
 _BRIEF = tuple(name for name in _PASSES if name != "new_gvn")
 """Passes where compiling takes longer than what is compiled."""
@@ -32,7 +32,7 @@ _numbers = itertools.count()
 
 
 class Library:
-    """Compiled functions in memory, for as long as the process lives.
+    """Compiled functions in memory, for the life of the process.
 
     Args:
         module: LLVM module, or its text.
@@ -107,7 +107,7 @@ class Library:
 
 
 _alive: list[Any] = []
-"""What LLVM would unload if Python let go of it."""
+"""References that keep compiled code loaded."""
 
 
 def compiled(
@@ -116,7 +116,7 @@ def compiled(
     name: str = "kernels",
     brief: bool = False,
 ) -> Library:
-    """The library that `build` describes, from memory or disk if it was made before.
+    """Return the library that `build` describes, from memory or disk if it exists there.
 
     Args:
         key_parts: all that the module depends on beside the texts of this library's modules, such

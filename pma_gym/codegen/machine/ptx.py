@@ -63,17 +63,17 @@ def thread_count(builder: Builder) -> Operand:
 
 
 def warp_any(builder: Builder, truth: Operand) -> Operand:
-    """Whether a truth holds in some thread of a warp, all of which must come here."""
+    """Write whether a condition holds in any thread of a warp; all threads must execute it."""
     return _call(builder, "vote.any.sync", TRUTH, _ALL, truth)
 
 
 def warp_meet(builder: Builder) -> None:
-    """Wait for all threads of a warp; what each wrote the others can read then."""
+    """Write a barrier for all threads of a warp, after which each sees the others' writes."""
     _call(builder, "bar.warp.sync", ir.VoidType(), _ALL)
 
 
 class Turns:
-    """Numbers 0, 1, 2, ... handed out to the threads of a warp, each to whoever asks first.
+    """Counter that gives the numbers 0, 1, 2, ... to the threads of a warp, in order of request.
 
     Args:
         builder: in the kernel, where all threads come; the first numbers up to `first` are taken.

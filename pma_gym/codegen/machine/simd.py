@@ -43,7 +43,7 @@ _INTRINSICS = {"square_root": "sqrt", "absolute": "fabs", "floor": "floor"}
 
 
 class SimdEmitter:
-    """Writes traced arithmetic for a number of lanes.
+    """Write traced arithmetic for a number of lanes.
 
     Args:
         width: lanes of a vector; 1 writes scalar code.
@@ -91,7 +91,7 @@ class SimdEmitter:
         outputs: Sequence[Value],
         known: Mapping[int, Operand],
     ) -> dict[int, Operand]:
-        """Write the arithmetic of the outputs where the builder stands.
+        """Write the arithmetic of the outputs at the builder's position.
 
         Args:
             builder: where to write.
@@ -228,21 +228,6 @@ class SimdEmitter:
         if isinstance(slot, int):
             return offset(builder, pointer, slot * self.elements, self.element)
         return offset(builder, pointer, builder.mul(slot, integer(self.elements)), self.element)
-
-    def load_spread(
-        self,
-        builder: Builder,
-        pointer: Operand,
-        index: Operand | int = 0,
-        kind: Kind = "real",
-    ) -> Operand:
-        """One number of memory, `index` reals behind a pointer, in every lane; see `load`."""
-        where = offset(builder, pointer, index, self.element)
-        if kind == "integer":
-            return self.spread(builder, builder.load(where, align=8, typ=INTEGER))
-        loaded = builder.load(where, align=self.size, typ=self.element)
-        wide = self.spread(builder, loaded)
-        return wide if kind == "real" else self._truth(builder, wide)
 
     def spread(self, builder: Builder, scalar: Operand) -> Operand:
         """A scalar in every lane."""

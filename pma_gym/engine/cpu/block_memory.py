@@ -1,4 +1,4 @@
-"""Where the numbers of environments lie for the processor: [block, place, lane].
+"""Memory layout of environments for the processor: [block, offset, lane].
 
 The lanes of a block are environments side by side, so that a vector holds one number of each.
 """

@@ -1,4 +1,4 @@
-"""The compiled control step of one environment or of many, everything included."""
+"""The complete compiled control step of one or many environments."""
 
 import ctypes
 

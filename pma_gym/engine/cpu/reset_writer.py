@@ -1,4 +1,4 @@
-"""Writes how episodes begin: pressure and rest, the sensors' zero, the first observation."""
+"""Code of resets: pressure and equilibrium, the sensors' zero, the first observation."""
 
 from llvmlite import ir
 
@@ -38,7 +38,7 @@ See `pma_gym.plant.equilibrium.solver.NoLoadEquilibria`."""
 
 
 class ResetWriter(BlockMemory):
-    """Writes beginnings.
+    """Write the code of resets.
 
     Attributes:
         module: where to.

@@ -1,1 +1,1 @@
-"""The control step as traced arithmetic: command, sensors, reward, score, an exercise's person."""
+"""The control step as traced arithmetic: command, sensors, reward, score, exercise operator."""

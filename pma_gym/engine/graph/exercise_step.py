@@ -1,4 +1,4 @@
-"""What an exercise adds to a control step, as traced arithmetic: operator, safety, score."""
+"""An exercise's part of a control step, as traced arithmetic: operator, safety filter, score."""
 
 import math
 from collections.abc import Mapping
@@ -16,12 +16,12 @@ from pma_gym.units import SI_FACTORS
 
 
 def held_volts(volts: Value) -> Value:
-    """Volts as a drive or a regulator takes them: 0 to 10 V."""
+    """Limit a voltage to the range of drive and regulator, 0 to 10 V."""
     return where(volts < 0.0, 0.0, where(volts > HIGHEST_VOLTAGE, HIGHEST_VOLTAGE, volts))
 
 
 class ExerciseStep:
-    """The operator of an exercise, its safety layer and its score.
+    """The operator of an exercise, its safety filter and its score.
 
     Args:
         inputs: of the control step that it belongs to.
@@ -43,12 +43,12 @@ class ExerciseStep:
 
     @property
     def plan(self) -> MomentProfile:
-        """Moment that the exercise takes over the angle, as he knows it, as inputs."""
+        """Moment that the operator expects over the angle, as inputs."""
         return profile_at_offsets(self.inputs.slot, self.exercise)
 
     @property
     def prescribed(self) -> Prescribed | None:
-        """What a measured moment is compared with; None where the speed is prescribed."""
+        """The prescribed moment; None if the exercise prescribes the speed."""
         if self.exercise.prescription is None:
             return None
         return Prescribed(self.inputs.slot("nominal_radius"), self.plan)
@@ -56,7 +56,7 @@ class ExerciseStep:
     # -- operator ----------------------------------------------------------------------------------
 
     def operate(self) -> dict[str, Value]:
-        """What the operator does in the step that begins: motor voltage, and how he comes out."""
+        """Compute the operator's motor voltage in the step, and the operator's new state."""
         slot, operator = self.inputs.slot, self.operator
         count = slot("count")
         time = to_real(count) * self.period
@@ -94,7 +94,7 @@ class ExerciseStep:
     # -- safety ------------------------------------------------------------------------------------
 
     def keep_safe(self, volts: Value) -> tuple[Value, dict[str, Value]]:
-        """Regulator voltage that the safety layer passes on, and the layer's new state."""
+        """Compute the regulator voltage after the safety filter, and the filter's new state."""
         if not self.state_layout.options.safety:
             return volts, {}
         # It stands at the rig: delays lie between the agent and it.
@@ -130,7 +130,7 @@ class ExerciseStep:
     # -- score -------------------------------------------------------------------------------------
 
     def score(self, sensed: Mapping[str, Value], first: bool) -> dict[str, Value]:
-        """What a step came to: new numbers by name.
+        """Compute the score after a step: new numbers by name.
 
         Args:
             sensed: the step's truth, and whether it broke a limit of the rig.

@@ -1,1 +1,1 @@
-"""How episodes start: pressure, station and disturbances drawn, the plant at equilibrium."""
+"""Resets: draw pressure, station and disturbances, and solve for the equilibrium."""

@@ -1,4 +1,4 @@
-"""How episodes begin: what is drawn, where the station rests, what will disturb it."""
+"""Resets of episodes: random draws, equilibrium and disturbances."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -36,7 +36,7 @@ _DRAWN_BY = "key_0", "key_1", "episode"
 
 
 class Episodes(EngineMemory):
-    """Begins episodes; see `Engine` for arguments and attributes."""
+    """Begin episodes; see `Engine` for arguments and attributes."""
 
     def __init__(
         self,
@@ -67,7 +67,7 @@ class Episodes(EngineMemory):
         self._reset_address = self._reset_arguments.ctypes.data
 
     def seed(self, indices: NDArray[np.int64], seeds: Sequence[int | None]) -> None:
-        """Begin the random numbers of environments anew; None keeps an environment's own."""
+        """Seed the random numbers of environments; None keeps an environment's present seed."""
         for index, seed in zip(indices.tolist(), seeds, strict=True):
             if seed is not None or not self.is_seeded(index):
                 self._keys[index] = np.random.SeedSequence(seed).generate_state(2)
@@ -77,7 +77,7 @@ class Episodes(EngineMemory):
                     self.integers[block, self.state_layout.offsets[name], lane] = number
 
     def is_seeded(self, index: int) -> bool:
-        """Whether an environment has random numbers to go on with."""
+        """Whether an environment has a seed."""
         return bool(self._episodes[index] >= 0 or self._keys[index].any())
 
     def reset(self, indices: NDArray[np.int64], wanted: Sequence[Pressure] | None = None) -> None:
@@ -280,7 +280,7 @@ class Episodes(EngineMemory):
         return drawn_events(self.task, self.options, *drawn_by)
 
     def events(self, index: int = 0) -> Events:
-        """What disturbs the episode of an environment, each of shape (events,)."""
+        """Return the disturbances of an environment's episode, each of shape (events,)."""
         return Events(*(row[0] for row in self._events(np.array([index]))))
 
     def park(self, indices: NDArray[np.int64]) -> None:

@@ -1,4 +1,4 @@
-"""How an exercise's episodes begin: who the operators are, what they expect, where the joint is."""
+"""Resets of exercises: the operators, the moment that they expect, and the joint's position."""
 
 import math
 from collections.abc import Iterable, Sequence
@@ -35,7 +35,7 @@ Numbers = dict[str, NDArray[np.float64]]
 
 
 def check_prescription(task: Task, model: Model, wanted: Iterable[Pressure]) -> None:
-    """Refuse what the device of a station cannot give: a moment, or 90 deg at a pressure.
+    """Reject a moment, or 90 deg at a pressure, that a station's device cannot reach.
 
     Args:
         task: any task.
@@ -186,7 +186,7 @@ def wound_back(
     zero: NDArray[np.float64],
     radii: NDArray[np.float64],
 ) -> None:
-    """Count the angle from where an exercise begins: the cable was drawn in before.
+    """Shift the zero of the angle to the start of an exercise, where the cable is already wound in.
 
     Args:
         names: of the states.

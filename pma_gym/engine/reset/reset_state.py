@@ -1,4 +1,4 @@
-"""How episodes begin: what is drawn, and where a station stands settled."""
+"""Initial states of episodes: random draws and equilibria."""
 
 from collections.abc import Sequence
 from threading import Lock
@@ -62,14 +62,14 @@ FEW = 8
 def drawn_events(
     task: Task, options: Options, keys: NDArray[np.int64], episodes: NDArray[np.int64]
 ) -> Events:
-    """What disturbs episodes; arguments as `drawn_pressures`."""
+    """Draw the disturbances of episodes; arguments as `drawn_pressures`."""
     return options.disturbing.draw(task.duration, keys, episodes * 4 + DISTURB)
 
 
 def holding_voltages(
     models: Sequence[Model], pressures: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Regulator voltages that settle at pressures (V), each by its own station's line.
+    """Regulator voltages for steady pressures (V), each by its station's calibration line.
 
     Raises:
         ValueError: a pressure that a regulator does not reach.
@@ -79,7 +79,7 @@ def holding_voltages(
 
 
 KEPT = 4096
-"""How many stations at rest are kept: who trains on drawn stations meets each again and again."""
+"""Size of the cache of equilibria: training on drawn stations meets each of them repeatedly."""
 
 _KEEPING = Lock()
 _KEPT: dict[tuple[Program, bytes, float], tuple[NDArray[np.float64], float]] = {}
@@ -92,7 +92,7 @@ def settled_at_no_load(
     regulator: NDArray[np.float64],
     vectors: NDArray[np.float64] | None,
 ) -> Settled:
-    """Stations at rest with 0 V on the motor.
+    """Find the equilibria of stations with 0 V at the motor.
 
     Args:
         rest: finds stations of the nominal plant at rest.
@@ -156,7 +156,7 @@ def settled_under_load(
     pressures: NDArray[np.float64],
     vectors: NDArray[np.float64] | None,
 ) -> Settled:
-    """Stations at rest under the load that the motor holds.
+    """Find the equilibria of stations under the motor's load.
 
     Args:
         nominal: the plant of the nominal model.
