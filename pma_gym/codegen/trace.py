@@ -10,7 +10,7 @@ from pma_gym.codegen.rebinding import rebind
 
 
 def trace(law: Callable, *arguments: Any, **named: Any) -> Any:  # noqa: ANN401
-    """What a law returns for traced values: its arithmetic, as values of their graph.
+    """Trace a law: return its result for symbolic values, as values of their graph.
 
     Args:
         law: a function written in the arithmetic of `pma_gym.effects.arithmetic`.

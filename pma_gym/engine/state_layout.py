@@ -10,13 +10,13 @@ from pma_gym.plant.rigs.station import STATION
 from pma_gym.tasks import PACE, Exercise, MomentProfile, Operator, OperatorState, Task
 
 PARTS: tuple[str, ...] = tuple(signal.reading or signal.name for signal in STATION.signals)
-"""What a reading consists of, in order: extension, rotation, load, pressure."""
+"""Components of a measurement, in order: extension, rotation, load, pressure."""
 
 START = "start_contraction"
 """Name of the initial contraction of an episode (m), the zero of a regulator's task."""
 
 HAND_PUSH = "memory_hand_push"
-"""Place of the force with which a hand pushes the slide (N)."""
+"""Name of the force with which a hand pushes the slide (N)."""
 
 TRUTH = STATION.outputs
 """True outputs, in the order of the plant's."""
@@ -47,7 +47,7 @@ FILTER_STATE = ("safety_pressure", "safety_extension", "safety_speed", "safety_m
 
 
 def profile_at_offsets(number: Callable[[str], Value], exercise: Exercise) -> MomentProfile:
-    """An operator's plan from the numbers at its places (`StateLayout.plan`).
+    """Build an operator's planned moment from the numbers of `StateLayout.plan`.
 
     Args:
         number: gives the value of a place.
@@ -81,7 +81,7 @@ class StateLayout:
 
     @property
     def readings(self) -> int:
-        """Readings that are kept: as many as are on the way, and as are observed."""
+        """Number of stored measurements, for the delay and the observed history."""
         return self.options.observation_delay + self.options.history + 1
 
     @property
@@ -107,7 +107,7 @@ class StateLayout:
 
     @property
     def held(self) -> list[str]:
-        """What the integration needs that stays during a control step."""
+        """Inputs of the integration that are constant during a control step."""
         own = [START] if self.task.actuator == "regulator" else []
         return ["motor_voltage", "regulator_voltage", "zero_contraction", *own, *self.prescribed]
 
@@ -149,7 +149,7 @@ class StateLayout:
 
     @cached_property
     def events(self) -> list[str]:
-        """Places of what disturbs: of each event its control step and its size, of a pulse its end.
+        """Names of the disturbances' numbers: step and size of each event, and the end of a pulse.
 
         A step is a whole number, kept as a real: which is the same in every precision.
         """

@@ -32,7 +32,7 @@ __all__ = ["Fit", "Round", "fit"]
 Array = NDArray[np.float64]
 
 SHOWN = 0.3
-"""What moving a parameter for a difference changes, in standard deviations of the readings."""
+"""Change of the measurements by a finite difference, in their standard deviations."""
 
 FIRST_MOVE, LEAST_MOVE, MOST_MOVE = 1e-3, 1e-6, 2e-2
 """First, least and largest such move, as a share of the parameter's value, or of its bounds' width
@@ -59,12 +59,11 @@ ROUGH = 100.0
 """All of these times so much for the first rounds, which use a few trials only."""
 
 MISSED = 0.1
-"""By how much chi-square may miss what the last step promised, as a share of that and of its mean
-per residual."""
+"""Tolerance of chi-square against the prediction of the last step, relative to the prediction and
+to the mean per residual."""
 
 FEW = 8
-"""How many trials the first rounds use, drawn from all by a fixed seed, where there are twice as
-many."""
+"""Number of trials in the first rounds, drawn by a fixed seed, if there are twice as many."""
 
 MOST_ROUNDS = 50
 _FIRST_DAMPING, _MOST_DAMPING = 1e-4, 1e12

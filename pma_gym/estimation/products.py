@@ -1,4 +1,4 @@
-"""Products of trials' residuals and of what changes them, summed over rows: what a fit needs.
+"""Products of trials' residuals and their sensitivities, summed over rows, for a fit.
 
 Written for compiled code because it reads many megabytes once, where array by array they would be
 read and written several times, and because threads that call NumPy in between wait for each other.
@@ -45,7 +45,7 @@ Array = NDArray[np.float64]
 
 @dataclass
 class Signals:
-    """Sensors' signals in a trial as measured, and as a model computes them for some parameters.
+    """Measured and simulated signals of a trial, for some parameters.
 
     Attributes:
         simulated: of each sensor: for the parameters, then with each of them moved, and with each
@@ -63,11 +63,11 @@ class Signals:
 
 
 def products(trials: Sequence[Signals], threads: int = 1) -> list[Array]:
-    """Products of weighted residuals and of what moving each parameter changes, with each other.
+    """Compute the products of weighted residuals and their sensitivities with each other.
 
     Args:
         trials: sensors' courses.
-        threads: how many threads share the work; no bit depends on it.
+        threads: number of threads; the bits do not depend on it.
     Returns:
         Of each trial a symmetric matrix of shape (1 + moved, 1 + moved), summed over its sensors.
     """

@@ -10,8 +10,8 @@ from functools import cache
 import numpy as np
 
 DIMENSIONS, SIZES, STRIDES, DATA, DTYPE, TYPE = 24, 32, 40, 16, 56, 8
-"""Bytes from an array's beginning to its number of dimensions, their sizes and strides, the address
-of its data, its dtype, and its own type, as 64-bit CPython has them."""
+"""Byte offsets in an array object of its number of dimensions, sizes, strides, data address, dtype
+and type, in 64-bit CPython."""
 
 _END = 64
 

@@ -11,7 +11,7 @@ from pma_gym.engine.cuda.kernel import ARGUMENTS, CudaKernel, Name
 
 
 class CpuDevice:
-    """Runs the threads of a kernel on the processor, one after another: to test without a GPU.
+    """Run the threads of a kernel on the processor, one after another, for tests without a GPU.
 
     Args:
         threads: how many threads share the environments; one each if not given.
@@ -33,7 +33,7 @@ class CpuDevice:
         return array.view(kind)
 
     def indices(self, flags: NDArray[Any]) -> NDArray[np.int64]:
-        """Where flags are set."""
+        """Indices of set flags."""
         return np.flatnonzero(flags)
 
     def actions(
@@ -46,7 +46,7 @@ class CpuDevice:
         return array
 
     def address(self, array: NDArray[Any]) -> int:
-        """Where an array begins."""
+        """Address of an array."""
         return array.ctypes.data
 
     def prepare(self, kernel: CudaKernel) -> None:

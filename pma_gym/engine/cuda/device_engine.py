@@ -29,7 +29,7 @@ Array = Any
 
 
 class Device(Protocol):
-    """What keeps arrays and runs a kernel's functions."""
+    """Interface of a device that stores arrays and runs a kernel's functions."""
 
     def zeros(self, shape: tuple[int, ...], kind: type[np.generic]) -> Array:
         """An array of zeros."""
@@ -44,7 +44,7 @@ class Device(Protocol):
         ...
 
     def indices(self, flags: Array) -> NDArray[np.int64]:
-        """Where flags are set; waits for the device."""
+        """Indices of set flags; waits for the device."""
         ...
 
     def actions(self, given: object, shape: tuple[int, int], kind: type[np.generic]) -> Array:
@@ -52,7 +52,7 @@ class Device(Protocol):
         ...
 
     def address(self, array: Array) -> int:
-        """Where an array begins."""
+        """Address of an array."""
         ...
 
     def prepare(self, kernel: CudaKernel) -> None:
@@ -92,7 +92,7 @@ class DeviceEngine:
     def __init__(
         self, task: Task, options: Options, count: int, precision: str, device: Device
     ) -> None:
-        """Compile, and make room."""
+        """Compile, and allocate arrays."""
         if precision not in ("double", "single"):
             raise ValueError(f"precision must be double or single, got {precision!r}")
         if callable(options.reward):
@@ -126,7 +126,7 @@ class DeviceEngine:
         self._begun = False
 
     def __reduce__(self) -> NoReturn:
-        """Refused: the numbers lie on a device, at addresses of this process."""
+        """Raise an error, because the state is on a device, at addresses of this process."""
         raise TypeError(
             f"a {type(self).__name__} cannot be copied or pickled, its numbers lie on a device; "
             "make another one of the same options and reset both with the same seed, or take a "
@@ -307,7 +307,7 @@ class DeviceEngine:
         return self.observations, self.rewards, self.terminated, self.truncated
 
     def check(self) -> None:
-        """Wait for the device and complain of what it could not.
+        """Wait for the device and raise an error for invalid actions.
 
         Raises:
             ValueError: an action since the last check was not finite.

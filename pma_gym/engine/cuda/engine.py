@@ -30,7 +30,7 @@ from pma_gym.tasks import Task
 
 
 class CudaEngine(DeviceEngine):
-    """State of n environments on a GPU, and what moves it; see `DeviceEngine`.
+    """Hold the state of n environments on a GPU and step them; see `DeviceEngine`.
 
     What goes in and comes out are torch tensors on the GPU, and work is put on torch's current
     stream: nothing waits for anything, and the tensors keep their places from step to step.
@@ -59,14 +59,14 @@ class CudaEngine(DeviceEngine):
         device: str = "cuda",
         seed: int | None = None,
     ) -> None:
-        """Compile, make room, and begin."""
+        """Compile, allocate arrays and reset."""
         self.device = TorchDevice(device)
         super().__init__(task, options, count, precision, self.device)
         self.reset(seed)
 
 
 def torch_with_gpu() -> Any:  # noqa: ANN401
-    """Torch, where it sees a GPU.
+    """Import torch and check that it has a GPU.
 
     Raises:
         GpuError: it is not installed, sees none, or there is no driver.
@@ -95,7 +95,7 @@ class TorchDevice:
     """
 
     def __init__(self, name: str = "cuda") -> None:
-        """Look for torch and the GPU."""
+        """Import torch and find the GPU."""
         self._use(torch_with_gpu(), name)
 
     def _use(self, torch: Any, name: str) -> None:  # noqa: ANN401
@@ -136,7 +136,7 @@ class TorchDevice:
         return given.detach().to(self._types[kind]).contiguous()
 
     def address(self, array: Any) -> int:  # noqa: ANN401
-        """Where a tensor begins."""
+        """Address of a tensor."""
         return array.data_ptr()
 
     def prepare(self, kernel: CudaKernel) -> None:

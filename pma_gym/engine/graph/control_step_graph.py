@@ -1,4 +1,4 @@
-"""What happens in a control step beside the plant, as traced arithmetic: for kernels of any width.
+"""A control step without the plant, as traced arithmetic for kernels of any width.
 
 From the action to the drive, from the plant's state to reading, observation, reward and end.
 """
@@ -37,16 +37,16 @@ class ControlStepGraph(StepInputs):
 
     @cached_property
     def exercise_step(self) -> ExerciseStep | None:
-        """What an exercise adds."""
+        """The exercise's part of the step."""
         return ExerciseStep(self) if self.state_layout.task.exercise else None
 
     @property
     def prescribed(self) -> Prescribed | None:
-        """What a measured moment is compared with, in an exercise that prescribes one."""
+        """The prescribed moment, in an exercise that has one."""
         return self.exercise_step.prescribed if self.exercise_step else None
 
     def command(self) -> dict[str, Value]:
-        """From an action to the commands that reach the station: new numbers by name."""
+        """Compute the commands at the station from an action: new numbers by name."""
         state_layout, options = self.state_layout, self.state_layout.options
         held = []
         for i in range(state_layout.actions):
@@ -116,7 +116,7 @@ class ControlStepGraph(StepInputs):
         return dict(zip(TRUTH, substitute(outputs, step_start_values(eq)), strict=True))
 
     def read(self, stream: int, count: Value) -> list[Value]:
-        """What the four sensors say (SI), by random numbers of a stream."""
+        """Measurements of the four sensors (SI), with random numbers of a stream."""
         eq, truth, signals = self.equations, self.truth(), STATION.signals
         measured = [(signal.sensor, signal.name) for signal in signals]
         lagged = [
@@ -137,7 +137,7 @@ class ControlStepGraph(StepInputs):
         return said
 
     def sense(self, count: Value, first: bool) -> dict[str, Value]:
-        """From the plant's state to reading, end and info: new numbers by name.
+        """Compute measurement, end and info from the plant's state: new numbers by name.
 
         Args:
             count: control steps since the trial began, an integer.
@@ -195,7 +195,7 @@ class ControlStepGraph(StepInputs):
         return dict(zip(state_layout.info, values, strict=True))
 
     def position(self, sensed: Mapping[str, Value]) -> Value:
-        """True position that the task asks for (m or rad)."""
+        """True position of the task's controlled quantity (m or rad)."""
         outputs = {name: sensed[f"true_{name}"] for name in TRUTH}
         return position_of(self.equations, self.state_layout.task, outputs)
 

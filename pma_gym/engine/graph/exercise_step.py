@@ -21,7 +21,7 @@ def held_volts(volts: Value) -> Value:
 
 
 class ExerciseStep:
-    """The operator of an exercise, its safety layer and its score.
+    """The operator of an exercise, its safety filter and its score.
 
     Args:
         inputs: of the control step that it belongs to.
@@ -43,12 +43,12 @@ class ExerciseStep:
 
     @property
     def plan(self) -> MomentProfile:
-        """Moment that the exercise takes over the angle, as he knows it, as inputs."""
+        """Moment that the operator expects over the angle, as inputs."""
         return profile_at_offsets(self.inputs.slot, self.exercise)
 
     @property
     def prescribed(self) -> Prescribed | None:
-        """What a measured moment is compared with; None where the speed is prescribed."""
+        """The prescribed moment; None if the exercise prescribes the speed."""
         if self.exercise.prescription is None:
             return None
         return Prescribed(self.inputs.slot("nominal_radius"), self.plan)

@@ -42,7 +42,7 @@ class Course:
 
 
 def course(eq: Equations, attempt: StepAttempt, task: Task) -> Course:
-    """How the task's position moves during an attempt."""
+    """Course of the task's position during a step attempt."""
     position = position_of(eq, task, eq.outputs)
     speed = _rate(eq, position)
     acceleration = _rate(eq, speed)
@@ -53,7 +53,7 @@ def course(eq: Equations, attempt: StepAttempt, task: Task) -> Course:
 
 
 def position_of(eq: Equations, task: Task, outputs: Mapping[str, Value]) -> Value:
-    """The position that a task asks for (m or rad), from the plant's outputs.
+    """Position of the task's controlled quantity (m or rad), from the plant's outputs.
 
     Of an exercise that prescribes a moment it is the moment's excess (N m).
     """
@@ -68,7 +68,7 @@ def position_of(eq: Equations, task: Task, outputs: Mapping[str, Value]) -> Valu
 
 
 def held_plan(eq: Equations, task: Task) -> MomentProfile:
-    """The moment that an exercise prescribes over the angle, as inputs that a step holds."""
+    """Moment that an exercise prescribes over the angle, as constant inputs of a step."""
     assert task.exercise is not None
     return profile_at_offsets(lambda name: eq.graph.input(name, HELD), task.exercise)
 
@@ -145,5 +145,5 @@ COURSE = ("start", "speed", "acceleration", "end", "end_speed")
 
 
 def attempt_due(accepted: Value, share: Value) -> Value:
-    """Whether a sample lies in an attempt that is taken; up to its very end."""
+    """Whether a sample lies in an accepted attempt, its end included."""
     return accepted & (share <= 1.0 + 1e-6)
