@@ -38,6 +38,7 @@ from pma_gym.discovery.selection.candidate_fits import (
     unfitted,
     without_idle,
 )
+from pma_gym.discovery.selection.unscored_fits import unscored_fits
 
 ALARM = 0.005
 """Family-wise rate of false alarms that the gate lets through."""
@@ -208,7 +209,12 @@ def _stage(
             refit = fitted(problem, baseline, before, chosen, each, journal)
             if refit is not None:
                 fits[each.candidate.name] = refit
-        fits |= restarted(problem, baseline, before, chosen, worth, fits, journal, progress)
+        scored = dict(fits)
+        if far:
+            fits |= unscored_fits(
+                problem, baseline, before, chosen, scores, fits, journal, progress
+            )
+        fits |= restarted(problem, baseline, before, chosen, worth, scored, journal, progress)
         failed = unfitted(problem, baseline, before, chosen, worth[:TRIED], fits)
     if scan.excess and all(before.chi_square - fit.chi_square < least for fit in fits.values()):
         gate, fits, scores, scan = (), {}, plainly, NO_EXCESS
