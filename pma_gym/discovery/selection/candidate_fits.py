@@ -32,6 +32,9 @@ ends there too tells nothing new."""
 BEST_SCANNED = 4
 """From how many values of that scan fits are begun."""
 
+LIKELY = 0.25
+"""Share of the best score's promise from which on a candidate is fitted from more beginnings."""
+
 LEAST_FITTED = 0.35
 """The same, below which a candidate counts as one that could not be fitted."""
 
@@ -213,8 +216,10 @@ def restarted(
     better: dict[str, Fitted] = {}
     if not all(map(problem.far, fits.values())):
         return better
-    for number, name in enumerate(sorted(fits, key=lambda each: cost(fits[each]))):
-        progress(f"fitting effect {len(chosen) + 1} from more beginnings", number, len(fits))
+    most = max((known[name].gain for name in fits), default=0.0)
+    likely = [name for name in fits if known[name].gain >= LIKELY * most]
+    for number, name in enumerate(sorted(likely, key=lambda each: cost(fits[each]))):
+        progress(f"fitting effect {len(chosen) + 1} from more beginnings", number, len(likely))
         restart = fitted(problem, baseline, before, chosen, known[name], journal, caught=True)
         if restart is not None and restart.chi_square < fits[name].chi_square:
             better[name] = restart
