@@ -50,7 +50,7 @@ def volts(reference: np.ndarray, angle: np.ndarray) -> np.ndarray:
     >>> bool(np.allclose(volts(np.full(20, 0.5), np.zeros(20)), 2.15))
     True
     """
-    speed = savgol_filter(angle, SMOOTHED, 2, deriv=1, delta=1.0 / RATE)
+    speed = np.asarray(savgol_filter(angle, SMOOTHED, 2, deriv=1, delta=1.0 / RATE))
     return KP * (reference - angle) - KV * speed
 
 

@@ -97,7 +97,9 @@ def fitted(
         ):
             break
     kept = 0.0 if best is None else before.chi_square - best.chi_square
-    if kept < LEAST_KEPT * each.gain:
+    # Far from the trials a promise of less than two like fits differ by is not worth a scan.
+    slight = problem.far(before) and each.gain < ALIKE * before.chi_square
+    if kept < LEAST_KEPT * each.gain and not slight:
         for begun in scanned_range(baseline, whitened, each).values[:BEST_SCANNED]:
             fit = problem.fit(before.model, extra, {each.candidate.name: begun})
             if fit is not None and (best is None or fit.chi_square < best.chi_square):
