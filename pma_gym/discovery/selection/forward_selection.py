@@ -216,11 +216,10 @@ def _stage(
             refit = fitted(problem, baseline, before, chosen, each, journal)
             if refit is not None:
                 fits[each.candidate.name] = refit
-        scored = dict(fits)
+        scored, tried = dict(fits), {each.candidate.name for each in worth[:TRIED]}
         if far:
-            fits |= unscored_fits(
-                problem, baseline, before, chosen, scores, fits, journal, progress
-            )
+            rest = [each for each in scores if each.candidate.name not in tried]
+            fits |= unscored_fits(problem, baseline, before, chosen, rest, fits, journal, progress)
         if not astray:
             fits |= restarted(problem, baseline, before, chosen, worth, scored, journal, progress)
         failed = unfitted(problem, baseline, before, chosen, worth[:TRIED], fits)

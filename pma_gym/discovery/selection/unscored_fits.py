@@ -32,15 +32,15 @@ def unscored_fits(
     journal: Journal,
     progress: Callable[[str, int, int], None],
 ) -> dict[str, Fitted]:
-    """Fits of candidates that were not fitted; none where scores lead somewhere.
+    """Fits of candidates whose scores were not worth one; none where scores lead somewhere.
 
     Args:
         problem: the trials.
         baseline: the model that they are tried beside, ready to be looked beside.
         before: the same.
         chosen: the effects in it.
-        scores: of every candidate.
-        fits: those that there are, by name.
+        scores: of candidates that were not fitted.
+        fits: of those that were, by name.
         journal: keeps fits.
         progress: called with a step's name, what is done and the total.
     """
@@ -48,8 +48,7 @@ def unscored_fits(
     least = min((fit.chi_square for fit in fits.values()), default=before.chi_square)
     if least < LARGER_PART * before.chi_square or not all(map(problem.far, fits.values())):
         return more
-    rest = [each for each in scores if each.candidate.name not in fits]
-    rest = [_over_probes(each) for each in rest if len(each.candidate.probes)]
+    rest = [_over_probes(each) for each in scores if len(each.candidate.probes)]
     for number, each in enumerate(rest):
         progress(f"fitting effect {len(chosen) + 1} beyond its score", number, len(rest))
         fit = fitted(problem, baseline, before, chosen, each, journal)
