@@ -218,8 +218,10 @@ def _stage(
                 fits[each.candidate.name] = refit
         scored, tried = dict(fits), {each.candidate.name for each in worth[:TRIED]}
         if far:
-            rest = [each for each in scores if each.candidate.name not in tried]
-            fits |= unscored_fits(problem, baseline, before, chosen, rest, fits, journal, progress)
+            others = [each for each in scores if each.candidate.name not in tried]
+            fits |= unscored_fits(
+                problem, baseline, before, chosen, others, fits, journal, progress
+            )
         if not astray:
             fits |= restarted(problem, baseline, before, chosen, worth, scored, journal, progress)
         failed = unfitted(problem, baseline, before, chosen, worth[:TRIED], fits)
