@@ -177,11 +177,7 @@ def _stage(
 ) -> Stage:
     shared, astray = problem, problem.astray(before)
     if astray:
-        # A motor that is all but locked hides what holds it. Looks and fits begin beside what was
-        # assumed of the parameters, and stay there until an effect is added.
-        held = problem.fit_as_assumed(before, chosen)
-        before = before if held is None else held
-        problem = replace(problem, widens=False)
+        problem, before = _as_assumed(problem, before, chosen)
     step = f"looking for effect {len(chosen) + 1}"
     progress(step, 0, len(rest))
     baseline = Baseline.at(
@@ -228,6 +224,18 @@ def _stage(
     if scan.excess and all(before.chi_square - fit.chi_square < least for fit in fits.values()):
         gate, fits, scores, scan = (), {}, plainly, NO_EXCESS
     return Stage(shared, before, baseline, tuple(scores), fits, gate, missing, scan, failed)
+
+
+def _as_assumed(
+    problem: FitProblem, before: Fitted, chosen: tuple[CandidateEffect, ...]
+) -> tuple[FitProblem, Fitted]:
+    """Trials and fit within what was assumed of the parameters.
+
+    A motor that is all but locked hides what holds it. Looks and fits begin beside what was assumed
+    of the parameters, and stay there until an effect is added.
+    """
+    held = problem.fit_as_assumed(before, chosen)
+    return replace(problem, widens=False), before if held is None else held
 
 
 def _refined_scores(
