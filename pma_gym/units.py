@@ -36,6 +36,7 @@ SI_FACTORS: dict[str, float] = {
     "1/%": 100.0,
     "1/N": 1.0,
     "mm/s": 1e-3,
+    "m/s": 1.0,
     "deg/s": math.pi / 180.0,
     "rad/s": 1.0,
     "ohm": 1.0,

@@ -81,7 +81,7 @@ from pma_gym.effects.sensors.sensor_errors import (
     POTENTIOMETER_ERROR,
     PRESSURE_TRANSDUCER_ERROR,
 )
-from pma_gym.effects.sensors.sensors import FORCE_SENSOR, JOINT_SENSORS, SENSORS
+from pma_gym.effects.sensors.sensors import FORCE_SENSOR, JOINT_SENSORS, SENSORS, TACHOMETER
 from pma_gym.effects.slide.coulomb_friction import COULOMB_FRICTION
 from pma_gym.effects.slide.hand_push import HAND_PUSH
 from pma_gym.effects.slide.slide import SLIDE
@@ -132,6 +132,7 @@ CATALOGUE: dict[str, Effect] = {
         LEG,
         SLIDE,
         START,
+        TACHOMETER,
         REGULATOR_LINE,
         REGULATOR_DELAY,
         REGULATOR_LAG,

@@ -52,10 +52,10 @@ def test_a_rig_is_three_files(tmp_path):
 def test_a_sensor_is_four_files(tmp_path):
     copy = copied(
         tmp_path, "pma_gym", "pyproject.toml", "tests/effects/conftest.py",
-        "tests/effects/test_catalogue.py", "tests/discovery/rigs/driven_slide",
+        "tests/effects/test_catalogue.py",
     )  # fmt: skip
     assert len(set(follow("add-a-sensor.md", copy))) == 4
-    done = run_pytest(copy, "tests/plant", "tests/effects", "-k", "tachometer")
+    done = run_pytest(copy, "tests/plant", "tests/effects", "-k", "torque_flange")
     assert done.returncode == 0, done.stdout + done.stderr
     # The page's own two tests, and contracts of the catalogue.
     assert int(done.stdout.split(" passed")[0].split()[-1]) >= 6

@@ -124,7 +124,7 @@ def test_a_driven_slide_moves_as_newton_says():
     time = np.arange(0.0, 1.0, 1e-3)
     trial = Trial(time, {"load_command": 100.0 * np.sin(6.0 * time)})
     moved = Plant(DRIVEN).simulate(trial, noise=False)
-    assert list(moved.measurements) == ["contraction"]
+    assert list(moved.measurements) == ["contraction", "velocity"]
 
     def rate(at, state):
         load = np.interp(at, time, trial.commands["load_command"])
@@ -132,6 +132,7 @@ def test_a_driven_slide_moves_as_newton_says():
 
     exact = solve_ivp(rate, (0.0, time[-1]), [0.0, 0.0], t_eval=time, rtol=1e-8, atol=1e-10)
     np.testing.assert_allclose(moved.truth["contraction"], exact.y[0], atol=2e-6)
+    np.testing.assert_allclose(moved.truth["velocity"], exact.y[1], atol=2e-5)
 
 
 def test_nothing_is_claimed_of_a_driven_slide_whose_parameters_are_off():

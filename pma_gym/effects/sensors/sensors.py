@@ -71,6 +71,15 @@ class Gyroscope(NamedTuple):
     ]
 
 
+class Tachometer(NamedTuple):
+    """Speed of a slide."""
+
+    bandwidth: Annotated[float, _bandwidth(200)]
+    noise: Annotated[
+        float, Quantity("mm/s", 0, 1e4, f"{_ASSUMED}: 0.5 (standard deviation)", 0.0, usual=0.5)
+    ]
+
+
 class ForceSensor(NamedTuple):
     """Force at a drive that imposes a motion."""
 
@@ -110,6 +119,8 @@ POTENTIOMETER = _sensor("potentiometer", "rotation", Potentiometer)
 
 ENCODER = _sensor("encoder", "angle", Encoder)
 GYROSCOPE = _sensor("gyroscope", "speed", Gyroscope)
+
+TACHOMETER = _sensor("tachometer", "velocity", Tachometer)
 
 FORCE_SENSOR = _sensor("force_sensor", "force", ForceSensor)
 

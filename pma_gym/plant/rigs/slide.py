@@ -66,7 +66,7 @@ def write_equations(equations: PlantEquations) -> None:
     eq.let("carried_force", eq.total("contact_force"))
     eq.let("slide_force", eq.total("slide_force") + eq["carried_force"])
     eq.let("resistance", eq.total("muscle_damping"))
-    eq.outputs = {"contraction": eq["contraction"]}
+    eq.outputs = {"contraction": eq["contraction"], "velocity": eq["velocity"]}
     pushed = eq["drive_force"] + eq.total("drive_loss")
     force = eq["slide_force"] + pushed - eq["resistance"] * eq["velocity"]
     eq.add_state("contraction", eq["velocity"], SCALES["contraction"])
@@ -91,7 +91,7 @@ def solve_equilibrium(problem: EquilibriumProblem) -> None:
 
 SLIDE = Rig(
     name="slide",
-    signals=signals("contraction"),
+    signals=signals("contraction", "velocity"),
     ports=PORTS,
     parts=PARTS,
     position_tolerances=POSITION_TOLERANCES,
