@@ -15,7 +15,7 @@ import numpy as np
 from pma_gym.documents import DocumentError, read_toml
 from pma_gym.effects import CATALOGUE, Effect
 from pma_gym.effects.effect import Parameters, Value
-from pma_gym.effects.ports import Port
+from pma_gym.effects.ports import Port, measured_output
 from pma_gym.effects.renamed_effects import with_present_names
 from pma_gym.limits import LimitError
 from pma_gym.paths import is_path, missing_file
@@ -339,7 +339,7 @@ def _check_ports(model: Model) -> None:
         raise ModelError(f"plant must be one of {', '.join(RIGS)}, got {model.plant!r}")
     rig = model.rig
     for name, effect in model.effects.items():
-        known = effect.port == "part" or effect.port.startswith("sensor:")
+        known = effect.port == "part" or measured_output(effect.port)
         if not known and effect.port not in rig.ports:
             raise ModelError(
                 f"[{name}] acts at port {effect.port}, which a {rig.name} does not have; "
