@@ -11,6 +11,7 @@ import matplotlib.image
 from moving_picture import draw_moving_picture
 from page_plots import first_controller_plot, leaderboard_plot
 from rich.console import Console
+from trial_plots import controllers_plot, environment_plot, measured_plot, rig_plot
 
 import pma_gym  # noqa: F401 - registers the environments
 from benchmarks.exercise.choice import Choice
@@ -88,6 +89,10 @@ def draw_exercise() -> None:
 if __name__ == "__main__":
     (IMAGES / "first-controller.png").write_bytes(first_controller_plot())
     (IMAGES / "leaderboards.png").write_bytes(leaderboard_plot())
+    (IMAGES / "controllers.png").write_bytes(controllers_plot())
+    (IMAGES / "environment.png").write_bytes(environment_plot())
+    (IMAGES / "rig.png").write_bytes(rig_plot())
+    (IMAGES / "measured.png").write_bytes(measured_plot())
     draw_station()
     draw_moving_picture(IMAGES / "rotation.gif")
     draw_diagnosis()

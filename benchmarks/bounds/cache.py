@@ -6,7 +6,6 @@ import os
 from collections.abc import Callable, Iterable
 from functools import partial
 from pathlib import Path
-from types import TracebackType
 
 from benchmarks.bounds import achievable, open_loop
 from benchmarks.bounds.achievable import achievable_bound
@@ -125,12 +124,7 @@ class Bounds:
     def __enter__(self) -> "Bounds":
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         self.close()
 
 

@@ -1,6 +1,8 @@
 """The commands about policies: `train` and `export`."""
 
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
@@ -60,23 +62,14 @@ def train(
     executor: ExecutorOption = LOCAL,
 ) -> None:
     """Train policies on stations that no suite has; an interrupted training goes on."""
-    from pma_gym.terminal import SafeConsole
-
-    try:
-        from benchmarks.training.checkpoint import CheckpointError
-        from benchmarks.training.configuration.preset import PresetError
-        from benchmarks.training.job import ordered, run_seeds, run_train
-    except ImportError as error:
-        print(
-            f"error: training needs Stable-Baselines3 ({error}); install it: "
-            "pip install -c constraints.txt -e '.[rl]'",
-            file=sys.stderr,
-        )
-        raise typer.Exit(2) from None
     usual = RESULTS / "training" / f"{Path(preset).stem}-{algo}"
     folder = out or usual / f"{task}-{seed}"
-    places = chosen_executor(executor, jobs)
-    try:
+    with _failures_in_words(folder):
+        from benchmarks.training.configuration.preset import PresetError
+        from benchmarks.training.job import ordered, run_seeds, run_train
+        from pma_gym.terminal import SafeConsole
+
+        places = chosen_executor(executor, jobs)
         if folder.exists() and not folder.is_dir():
             raise PresetError(f"--out {folder} is a file; name a folder")
         order = ordered(algo, task, preset, seed, steps, device, threads, patience)
@@ -87,6 +80,28 @@ def train(
         folders = [out / f"seed-{n}" if out else usual / f"{task}-{n}" for n in numbers]
         trainings = [(replace(order, seed=n), f) for n, f in zip(numbers, folders, strict=True)]
         run_seeds(trainings, places, SafeConsole())
+
+
+@contextmanager
+def _failures_in_words(folder: Path) -> Iterator[None]:
+    """End the program with a message of what stopped a training.
+
+    Args:
+        folder: of its checkpoints.
+    """
+    try:
+        from benchmarks.training.checkpoint import CheckpointError
+        from benchmarks.training.configuration.preset import PresetError
+        from benchmarks.training.job import run_train  # noqa: F401 - needs Stable-Baselines3
+    except ImportError as error:
+        print(
+            f"error: training needs Stable-Baselines3 ({error}); install it: "
+            "pip install -c constraints.txt -e '.[rl]'",
+            file=sys.stderr,
+        )
+        raise typer.Exit(2) from None
+    try:
+        yield
     except PresetError as error:
         refuse(error)
     except CheckpointError as error:

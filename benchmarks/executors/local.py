@@ -6,7 +6,6 @@ from collections.abc import Callable, Mapping
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, TimeoutError, wait
 from concurrent.futures.process import BrokenProcessPool
 from multiprocessing import get_context
-from types import TracebackType
 from typing import Generic, TypeVar, cast
 
 from benchmarks.executors.executor import ExecutorMissing, OnEnd
@@ -116,12 +115,7 @@ class Background(Generic[Result]):
     def __enter__(self) -> "Background[Result]":
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         self.end()
 
 

@@ -50,7 +50,7 @@ def designed(
     kind = task_kind(station)
     if kind not in defaults:
         must_give_a_position(station)
-    loops = _read(path)["controllers"].get(controller, {})
+    loops = read_settings(path, SCHEMA, "design")["controllers"].get(controller, {})
     known = [name for name, kinds in loops.items() if kind in kinds]
     if not known:
         return defaults[kind]
@@ -123,12 +123,22 @@ def _dead_time(loop: str) -> float:
 
 
 @cache
-def _read(path: Path) -> dict[str, Any]:
+def read_settings(path: Path, schema: int, command: str) -> dict[str, Any]:
+    """A file of settings, read once.
+
+    Args:
+        path: the file.
+        schema: its version.
+        command: of the benchmark, that writes such a file.
+
+    Raises:
+        ValueError: the file has another version.
+    """
     document = read_json(path)
-    schema = document.get("schema") if isinstance(document, dict) else None
-    if schema != SCHEMA:
+    got = document.get("schema") if isinstance(document, dict) else None
+    if got != schema:
         raise ValueError(
-            f"{path} must have schema {SCHEMA}, got {schema!r}; write it anew: "
-            "python -m benchmarks design"
+            f"{path} must have schema {schema}, got {got!r}; write it anew: "
+            f"python -m benchmarks {command}"
         )
     return document

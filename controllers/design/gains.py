@@ -1,15 +1,19 @@
 """Gains by model, loop, task, controller and pressure, as `benchmarks.tuning.tune` writes them."""
 
 import math
-from functools import cache
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from controllers.design.designs import loop_name, must_give_a_position, nearest_loop, task_kind
+from controllers.design.designs import (
+    loop_name,
+    must_give_a_position,
+    nearest_loop,
+    read_settings,
+    task_kind,
+)
 from pma_gym.data.signals import SIGNALS
-from pma_gym.documents import read_json
 from pma_gym.envs import StationInfo
 from pma_gym.units import SI_FACTORS
 
@@ -102,7 +106,7 @@ def scheduled_gains(controller: str, station: StationInfo, path: Path = GAINS_FI
     Raises:
         ValueError: there are none, or the task is an exercise, which has no position to follow.
     """
-    models = _read(path)["models"]
+    models = read_settings(path, SCHEMA, "tune")["models"]
     must_give_a_position(station)
     model, task, kind = station.model, station.task, task_kind(station)
     name = model.name if model.name in models else model.plant
@@ -126,15 +130,3 @@ def scheduled_gains(controller: str, station: StationInfo, path: Path = GAINS_FI
 
 def _unit(quantity: str) -> str:
     return "deg" if SIGNALS[quantity].is_angle else "mm"
-
-
-@cache
-def _read(path: Path) -> dict[str, Any]:
-    document = read_json(path)
-    schema = document.get("schema") if isinstance(document, dict) else None
-    if schema != SCHEMA:
-        raise ValueError(
-            f"{path} must have schema {SCHEMA}, got {schema!r}; write it anew: "
-            "python -m benchmarks tune"
-        )
-    return document

@@ -26,7 +26,7 @@ in SIMD lanes; `native` compiles those for the processor and keeps the result, `
     ...     arguments = [("blocks", INTEGER), ("table", POINTER), ("data", POINTER)]
     ...     builder, (blocks, table, data) = function(module, "tension", arguments)
     ...     inputs = live_inputs([force])
-    ...     known = {v.id: simd.load_spread(builder, table, i) for i, v in enumerate(inputs[2:])}
+    ...     known = {v.id: simd.load(builder, table, i) for i, v in enumerate(inputs[2:])}
     ...     with loop(builder, blocks) as block:
     ...         row = simd.address(builder, data, builder.mul(block, INTEGER(3)))
     ...         known |= {v.id: simd.load(builder, row, i) for i, v in enumerate(inputs[:2])}
@@ -37,7 +37,8 @@ in SIMD lanes; `native` compiles those for the processor and keeps the result, `
 
     >>> pointer = ctypes.c_void_p
     >>> run = compiled(["example"], build).function("tension", [ctypes.c_int64, pointer, pointer])
-    >>> table, data = np.array(cable), np.zeros((4, 3, 8))  # [block, slot, lane]
+    >>> table = np.repeat(np.array(cable), 8)  # [slot, lane]
+    >>> data = np.zeros((4, 3, 8))  # [block, slot, lane]
     >>> data[:, 0] = np.linspace(0.0, 2e-3, 32).reshape(4, 8)
     >>> run(4, table.ctypes.data, data.ctypes.data)
     >>> float(data[3, 2, 7].round(3))

@@ -33,7 +33,8 @@ def logs(count=2, seconds=1.0, rate=150.0):
     for _ in range(count):
         time = np.arange(0.0, seconds, 1.0 / rate)
         waves = [(generator.uniform(15, 40), f, generator.uniform(0, 6)) for f in (0.4, 1.1, 2.3)]
-        load = sum(size * np.sin(2 * np.pi * f * time + phase) for size, f, phase in waves)
+        tones = [size * np.sin(2 * np.pi * f * time + phase) for size, f, phase in waves]
+        load = np.sum(tones, axis=0)
         start = {"start.velocity_mm_per_s": generator.uniform(-100.0, 100.0)}
         asked = Trial(time, {"load_command": load})
         exact = Plant(rubbing.replace(start)).simulate(asked, noise=False).measurements["velocity"]

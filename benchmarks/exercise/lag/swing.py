@@ -18,13 +18,9 @@ Source:
 import math
 from dataclasses import dataclass
 
-import numpy as np
-from scipy.linalg import solve
-
-from benchmarks.exercise.lag.points import Point, points, rates
+from benchmarks.exercise.lag.points import Point, points
 from pma_gym.engine.actions import HIGHEST_VOLTAGE
 from pma_gym.plant.model import Model
-from pma_gym.tasks import EVERY_TASK
 
 FREQUENCIES_HZ = (0.0, 0.5, 1.0, 2.0, 4.0, 8.0, 12.0)
 """Frequencies of the table (Hz): below 2 Hz unsteadiness, 8 to 12 Hz tremor."""
@@ -75,23 +71,3 @@ def swings(task: str, model: Model) -> tuple[Swing, ...]:
     lag = model.parameters["regulator_lag"].time_constant
     gain = model.parameters["regulator_line"].gain
     return tuple(Swing(point, lag, gain) for point in points(task, model))
-
-
-def unhindered(point: Point, model: Model, frequency: float, share: float) -> tuple[float, float]:
-    """What an operator's oscillation comes to when the regulator stands still.
-
-    Args:
-        point: where.
-        model: the station.
-        frequency: of the oscillation (Hz).
-        share: its amplitude over the moment.
-    Returns:
-        Amplitude of his moment (N m), and of what the exercise holds (deg or N m).
-    """
-    near, exercise = rates(point, model), EVERY_TASK[point.task].exercise
-    assert exercise is not None
-    stiffness = exercise.population.typical.stiffness * math.pi / 180.0
-    a = near.a - stiffness * np.outer(near.by_moment, near.angle)
-    moment = share * point.moment
-    state = solve(2j * math.pi * frequency * np.eye(len(a)) - a, near.by_moment * moment)
-    return moment, float(abs(near.output @ state))

@@ -106,8 +106,7 @@ def draw_case(
     hidden = effects if effects is not None else _draw_effects(g, block)
     rig, factors = draw_rig(g, 0.25 if block == "parameters" else 0.10)
     names, commands, repeats = _draw_trials(g, rig, set(hidden), trials, seconds)
-    levels = g.uniform(0.7, 1.4, 4)
-    colours = g.uniform(0.0, 0.5, 4)
+    levels, colours = g.uniform(0.7, 1.4, 4), g.uniform(0.0, 0.5, 4)
     measured = np.ones(commands.motor.shape, bool)
     experiment = Experiment(commands, measured, rigs.noise_levels(levels))
     largest = float(rig["drive_gain"] * commands.motor.max() + rig["drive_offset"])
@@ -139,15 +138,8 @@ def draw_case(
         "seed": seed,
         "number": number,
     }
-    count = range(trials)
-    return Case(
-        [time for _ in count],
-        [commands.motor[i] for i in count],
-        [commands.regulator[i] for i in count],
-        readings,
-        repeats,
-        truth,
-    )
+    motor, regulator = list(commands.motor), list(commands.regulator)
+    return Case([time] * trials, motor, regulator, readings, repeats, truth)
 
 
 def measure(

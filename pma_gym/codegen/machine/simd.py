@@ -229,21 +229,6 @@ class SimdEmitter:
             return offset(builder, pointer, slot * self.elements, self.element)
         return offset(builder, pointer, builder.mul(slot, integer(self.elements)), self.element)
 
-    def load_spread(
-        self,
-        builder: Builder,
-        pointer: Operand,
-        index: Operand | int = 0,
-        kind: Kind = "real",
-    ) -> Operand:
-        """One number of memory, `index` reals behind a pointer, in every lane; see `load`."""
-        where = offset(builder, pointer, index, self.element)
-        if kind == "integer":
-            return self.spread(builder, builder.load(where, align=8, typ=INTEGER))
-        loaded = builder.load(where, align=self.size, typ=self.element)
-        wide = self.spread(builder, loaded)
-        return wide if kind == "real" else self._truth(builder, wide)
-
     def spread(self, builder: Builder, scalar: Operand) -> Operand:
         """A scalar in every lane."""
         if self.elements == 1:

@@ -5,17 +5,11 @@ from collections.abc import Mapping
 import numpy as np
 
 from pma_gym.discovery.fitting.fit_problem import Fitted
-from pma_gym.discovery.fitting.free_parameters import unit
+from pma_gym.discovery.fitting.free_parameters import at_limit, unit
 from pma_gym.discovery.result.estimates import Estimate, NamedEffect
 from pma_gym.discovery.screening.score_test import ScreeningScore
 from pma_gym.discovery.selection.forward_selection import Stage
 from pma_gym.discovery.verdict.findings import Findings
-
-AT_LIMIT = 1e-6
-"""Distance from an end of a range, as a share of the range, within which a value is at that end."""
-
-BOUNDLESS = 1e3
-"""Times the lower end of a positive range that count for its width, where it is wider."""
 
 
 def selected_effects(findings: Findings) -> tuple[NamedEffect, ...]:
@@ -63,16 +57,6 @@ def estimate(findings: Findings, fit: Fitted, path: str) -> Estimate:
     # it is not at that end.
     limit = "" if lower < low and high < upper else limit
     return Estimate(value, low, high, unit(path), limit)
-
-
-def at_limit(value: float, lower: float, upper: float) -> str:
-    """Which end of its range a value is at: `lower`, `upper`, or none: empty."""
-    reach = AT_LIMIT * (upper - lower)
-    if value >= upper - reach:
-        return "upper"
-    # An upper end that is never reached says nothing of how near the lower one is.
-    least = min(reach, BOUNDLESS * AT_LIMIT * lower) if lower > 0.0 else reach
-    return "lower" if value <= lower + least else ""
 
 
 def _bounds(findings: Findings, fit: Fitted) -> Mapping[str, tuple[float, float]]:

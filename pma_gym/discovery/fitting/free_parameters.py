@@ -44,6 +44,13 @@ WIDER = 2.0
 rig."""
 
 
+AT_LIMIT = 1e-6
+"""Distance from an end of a range, as a share of the range, within which a value is at that end."""
+
+BOUNDLESS = 1e3
+"""Times the lower end of a positive range that count for its width, where it is wider."""
+
+
 @dataclass(frozen=True)
 class FreeParameters:
     """A model's own parameters.
@@ -84,6 +91,16 @@ def values(model: Model, paths: Sequence[str]) -> Array:
         effect, _, door = path.partition(".")
         numbers.append(model.at_the_door(effect)[door])
     return np.array(numbers, float)
+
+
+def at_limit(value: float, lower: float, upper: float) -> str:
+    """Which end of its range a value is at: `lower`, `upper`, or none: empty."""
+    reach = AT_LIMIT * (upper - lower)
+    if value >= upper - reach:
+        return "upper"
+    # An upper end that is never reached says nothing of how near the lower one is.
+    least = min(reach, BOUNDLESS * AT_LIMIT * lower) if lower > 0.0 else reach
+    return "lower" if value <= lower + least else ""
 
 
 def unit(path: str) -> str:

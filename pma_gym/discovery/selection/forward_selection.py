@@ -174,6 +174,13 @@ def _stage(
     journal: Journal,
     progress: Progress,
 ) -> Stage:
+    shared, astray = problem, problem.astray(before)
+    if astray:
+        # A motor that is all but locked hides what holds it. Looks and fits begin beside what was
+        # assumed of the parameters, and stay there until an effect is added.
+        held = problem.fit_as_assumed(before, chosen)
+        before = before if held is None else held
+        problem = replace(problem, widens=False)
     step = f"looking for effect {len(chosen) + 1}"
     progress(step, 0, len(rest))
     baseline = Baseline.at(
@@ -208,11 +215,12 @@ def _stage(
             refit = fitted(problem, baseline, before, chosen, each, journal)
             if refit is not None:
                 fits[each.candidate.name] = refit
-        fits |= restarted(problem, baseline, before, chosen, worth, fits, journal, progress)
+        if not astray:
+            fits |= restarted(problem, baseline, before, chosen, worth, fits, journal, progress)
         failed = unfitted(problem, baseline, before, chosen, worth[:TRIED], fits)
     if scan.excess and all(before.chi_square - fit.chi_square < least for fit in fits.values()):
         gate, fits, scores, scan = (), {}, plainly, NO_EXCESS
-    return Stage(problem, before, baseline, tuple(scores), fits, gate, missing, scan, failed)
+    return Stage(shared, before, baseline, tuple(scores), fits, gate, missing, scan, failed)
 
 
 def _refined_scores(

@@ -5,10 +5,11 @@ stays within `FLAT` of its least up to a limit of the law (a Stribeck speed far 
 the parameter is not determined: it is held at that limit, the fit is repeated without it, and no
 value is given for it, only the bound that the profile has on the other side. An effect may also
 say that a simpler law of its own sets one parameter equal to another (`Effect.ties`); the whole law
-stays where it explains more than its further parameters cost, of readings left out too.
+stays where it explains more than its further parameters cost, of readings left out too, and where
+none of them is at an end of its range: such a law borrows the effect's form for something else.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,7 +17,7 @@ import numpy as np
 from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
 from pma_gym.discovery.fitting.covariance import covariance
 from pma_gym.discovery.fitting.fit_problem import FitProblem, Fitted
-from pma_gym.discovery.fitting.free_parameters import unit, values
+from pma_gym.discovery.fitting.free_parameters import at_limit, unit, values
 from pma_gym.discovery.fitting.held_out import held_out_misfit
 from pma_gym.discovery.result.estimates import Undetermined
 from pma_gym.discovery.selection.candidate_fits import cost
@@ -165,11 +166,26 @@ def _tied(problem: FitProblem, state: Nested, place: int) -> Nested | None:
         equal = _equal(problem, state, place, (path, twin), rest)
         # What the whole law explains more must be worth its parameters, as anywhere.
         if equal is not None and (
-            cost(equal.fit) < cost(state.fit) or not _asked_for(problem, state, equal)
+            cost(equal.fit) < cost(state.fit)
+            or _ended(problem, state, (path, *rest))
+            or not _asked_for(problem, state, equal)
         ):
             known = {each: Undetermined(None, None, unit(each)) for each in (path, *rest)}
             return replace(equal, undetermined={**state.undetermined, **known})
     return None
+
+
+def _ended(problem: FitProblem, state: Nested, paths: Sequence[str]) -> bool:
+    """Whether one of some parameters is at an end of the range that its fit had."""
+    whitened = problem.whitened_at(state.fit, state.chosen)
+    ranges = dict(
+        zip(
+            (free.path for free in whitened.free),
+            zip(whitened.lower.tolist(), whitened.upper.tolist(), strict=True),
+            strict=True,
+        )
+    )
+    return any(bool(at_limit(state.fit.estimate(path)[0], *ranges[path])) for path in paths)
 
 
 def _asked_for(problem: FitProblem, whole: Nested, simpler: Nested) -> bool:

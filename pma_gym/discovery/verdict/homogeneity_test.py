@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
 from pma_gym.discovery.fitting.fit_problem import FitProblem, Fitted
 from pma_gym.discovery.preparation.whitened_residuals import Pieces, WhitenedResiduals
+from pma_gym.effects import CATALOGUE
 from pma_gym.estimation.least_squares import inverse
 
 Array = NDArray[np.float64]
@@ -30,7 +31,10 @@ def homogeneity_test(
 ) -> Mapping[str, float]:
     """How much the size of an effect scatters beyond its errors, as a share of it.
 
-    Every group of pieces is given a size of its own, to first order, with all parameters refitted.
+    Terms of one law (a dry friction and its growth with the pressure) have one size, that of the
+    law: a growth that is not quite in proportion is a small error of the friction, however large a
+    share of the growth it is. Every group of pieces is given a size of its own, to first order,
+    with all parameters refitted.
 
     Args:
         problem: the trials.
@@ -47,11 +51,13 @@ def homogeneity_test(
     pieces = whitened.pieces(fit.values, fit.steps)
     if pieces is None:
         return {}
-    direction = _direction(fit, chosen[place])
+    direction, held = _direction_of_law(fit, chosen, place)
     if not direction.any():
         return {}
     curvature = pieces.products[:, 1:, 1:].sum(axis=0) + np.diag(whitened.prior**-2.0)
-    own = inverse(curvature)
+    own = np.zeros_like(curvature)
+    free = np.flatnonzero(~held)
+    own[np.ix_(free, free)] = inverse(curvature[np.ix_(free, free)])
     across = pieces.products[:, 1:, 1:] @ direction
     slopes = pieces.products[:, 1:, 0] @ direction + across @ _last_step(whitened, fit, pieces)
     return {
@@ -89,6 +95,20 @@ def newton_step(gradient: Array, curvature: Array, free: NDArray[np.bool_]) -> A
     known = np.isfinite(np.diag(own))
     step[moving[known]] = -own[np.ix_(known, known)] @ gradient[moving[known]]
     return step
+
+
+def _direction_of_law(
+    fit: Fitted, chosen: Sequence[CandidateEffect], place: int
+) -> tuple[Array, NDArray[np.bool_]]:
+    """How a fit's parameters move where an effect and all terms of its law grow; what is held.
+
+    Sizes of several terms are held beside those of groups: a growth with the pressure would undo
+    what a group of one pressure has of its own.
+    """
+    law = CATALOGUE[chosen[place].effect]
+    terms = [each for each in chosen if CATALOGUE[each.effect].shares_law(law)]
+    direction = np.sum([_direction(fit, each) for each in terms], axis=0)
+    return direction, (direction != 0.0) & (len(terms) > 1)
 
 
 def _direction(fit: Fitted, candidate: CandidateEffect) -> Array:

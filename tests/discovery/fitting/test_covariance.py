@@ -105,7 +105,12 @@ def linear(sizes, sharpness, away):
     )
     none, one = np.zeros(1), np.ones(1, bool)
     law = SimpleNamespace(
-        paths=("law.size",), fitted_paths=["law.size"], absent=none, amplitudes=one, fitted=one
+        effect="hysteresis",
+        paths=("law.size",),
+        fitted_paths=["law.size"],
+        absent=none,
+        amplitudes=one,
+        fitted=one,
     )
     fit = SimpleNamespace(model=None, paths=("law.size", "own"), values=values, steps=None)
     problem = SimpleNamespace(whitened_at=lambda *_: whitened, files=(), trials=sizes)

@@ -1,6 +1,7 @@
 """Nested laws: what trials do not determine leaves the law of an effect, and has no value."""
 
 import json
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -19,6 +20,7 @@ from pma_gym.discovery.workflow import diagnose
 from pma_gym.effects import CATALOGUE
 from pma_gym.plant.model import load_model
 from pma_gym.plant.plant import Plant
+from tests.discovery.laboratory import only
 from tests.discovery.rig_trials import FROZEN
 
 SLIDE = load_model(FROZEN / "driven_slide" / "model.toml")
@@ -37,14 +39,15 @@ def rubbing(static, dynamic, speed, count=3):
     for k in range(count):
         waves = 60.0 * np.sin(2 * np.pi * (0.9 + 0.3 * k) * time + k)
         force = waves + 30.0 * np.sign(np.sin(2 * np.pi * (1.1 + 0.4 * k) * time))
-        logs.append(Plant(truth).simulate(Trial(time, {"load_command": force}), seed=k))
+        trial = Plant(truth).simulate(Trial(time, {"load_command": force}), seed=k)
+        logs.append(only(trial, "contraction"))
     return logs, truth
 
 
 def fit_of(static, dynamic, speed, begun):
     """A fit of such trials with the whole law, begun at values, and on which bench."""
     logs, _ = rubbing(static, dynamic, speed)
-    noise = (white_noise(2e-5),)
+    noise = (white_noise(2e-5),) * 2
     bench = FitProblem(logs, SLIDE, free_parameters(SLIDE), noise)
     start = np.array([*begun, *DRY.absent[len(begun) :]])
     fitted = bench.fit(SLIDE, (DRY,), {DRY.name: start})
@@ -71,10 +74,21 @@ def test_friction_that_falls_with_the_speed_keeps_its_law():
     assert less.fit is fit
 
 
+def test_a_law_with_a_number_at_an_end_of_its_range_is_left(monkeypatch):
+    """Readings left out may ask for a static friction of 0: it stands for something else."""
+    monkeypatch.setattr(nested_laws, "_asked_for", lambda *_: True)
+    bench, fit = fit_of(0.0, 12.0, 3.0, (0.0, 12.0, 3.0))
+    place = fit.paths.index(STATIC)
+    at_end = replace(fit, values=np.where(np.arange(len(fit.values)) == place, 0.0, fit.values))
+    less = nested(bench, at_end, (DRY,))
+    assert set(less.undetermined) == {STATIC, SPEED}
+    assert less.chosen[0].fitted_paths == [DYNAMIC]
+
+
 def test_a_speed_beyond_all_speeds_is_only_known_to_lie_above():
     """A static friction that hardly falls: the fall's speed is above something, no more."""
     logs, truth = rubbing(12.0, 4.0, 900.0)
-    noise = (white_noise(2e-4),)
+    noise = (white_noise(2e-4),) * 2
     bench = FitProblem(logs, SLIDE, free_parameters(SLIDE), noise)
     table = truth.at_the_door("coulomb_friction")
     begun = np.array([table[path.partition(".")[2]] for path in DRY.paths], float)

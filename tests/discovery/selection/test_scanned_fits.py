@@ -5,7 +5,7 @@ import pytest
 
 from pma_gym import Model, Plant, Trial, load_model
 from pma_gym.discovery import diagnose
-from pma_gym.discovery.answer.estimates import at_limit
+from pma_gym.discovery.fitting.free_parameters import at_limit
 
 
 def _trials(model: Model) -> list[Trial]:
