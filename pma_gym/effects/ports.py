@@ -131,7 +131,7 @@ STATION_PORTS: dict[str, Port] = {
 """Ports of a station: for each the number of effects, the use of their results, and its signals."""
 
 SENSOR, SENSOR_DELAY = "sensor:", "sensor_delay:"
-"""Prefixes of the ports of a sensor's errors and lag, and of its delay, before its output's name."""
+"""Prefixes, before an output's name, of the ports of a sensor's errors and lag and of its delay."""
 
 SENSOR_PORTS: dict[str, Port] = {
     f"{SENSOR}{output}": Port("reading on top of the truth, added", signals=_SENSOR, absent=0.0)
