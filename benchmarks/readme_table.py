@@ -68,7 +68,7 @@ def summary(run: Run) -> str:
 
 
 def setting(run: Run) -> str:
-    """What was run, in a sentence."""
+    """Describe the run in a sentence."""
     suite = run["suite"]
     noise = "with" if suite["noise"] else "without"
     return (
@@ -79,7 +79,7 @@ def setting(run: Run) -> str:
 
 
 def speed(run: Run) -> str:
-    """How long the run took."""
+    """Describe the duration of the run."""
     info = run["run"]
     before = info.get("cases_reused", 0)
     reused = f" ({before} of the cases were done before)" if before else ""
@@ -186,7 +186,7 @@ KEPT: dict[str, Callable[[], str]] = {diagnosis.__name__: diagnosis}
 
 
 def refreshed(text: str, run: Run | None) -> str:
-    """A text with the run's figures in its blocks, and those that were kept; these alone of no run.
+    """Fill a text's blocks with the run's figures and the kept ones; without a run, the kept only.
 
     Raises:
         RunError: a block that nobody renders, or figures that are missing.

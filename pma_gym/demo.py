@@ -70,7 +70,7 @@ def demonstrate(pressure_kpa: int = PRESSURE_KPA, seed: int = SEED) -> Demonstra
 
 
 def draw(shown: Demonstration) -> Figure:
-    """Extension above, voltage below."""
+    """Draw extension above voltage."""
     time = shown.trial.time
     slope, intercept = shown.measured_line
     with picture(7.2, 4.6) as drawn:

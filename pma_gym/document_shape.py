@@ -1,4 +1,4 @@
-"""Which keys a document must have, and of which kind their values are."""
+"""Schemas of documents: required keys and kinds of values."""
 
 import math
 import reprlib
@@ -16,7 +16,7 @@ class Whole(NamedTuple):
 
 
 class Real(NamedTuple):
-    """A finite number within limits, both included; NaN and infinity too where it says so."""
+    """A finite number within limits, both included; NaN and infinity too where allowed."""
 
     low: float = -math.inf
     high: float = math.inf
@@ -31,7 +31,7 @@ class ListOf(NamedTuple):
 
 
 class Maybe(NamedTuple):
-    """A value, or none."""
+    """An optional value."""
 
     shape: Any
 
@@ -43,11 +43,11 @@ _KINDS = {object: "a value", str: "a text", bool: "true or false", dict: "a tabl
 
 
 class ShapeError(ValueError):
-    """A document of another shape; the message names the key, the rule and what came."""
+    """A document that violates its schema; the message names key, rule and value."""
 
 
 def check_shape(value: object, shape: Any, place: str = "") -> None:  # noqa: ANN401
-    """Refuse a document of another shape.
+    """Check a document against a schema.
 
     Args:
         value: the document.
@@ -135,7 +135,7 @@ def _check(good: bool, place: str, rule: str, came: object) -> None:
 
 
 def shape_of(hint: Any, finite: bool = True) -> Any:  # noqa: ANN401 - a type hint in, a shape out
-    """The shape of what JSON gives back of a dataclass or of another type hint.
+    """Derive the schema of the JSON of a dataclass or other type hint.
 
     Args:
         hint: a dataclass, or what annotations are made of.

@@ -1,4 +1,4 @@
-"""TOML, JSON and YAML from files: limits before memory is taken, and one kind of error.
+"""Readers of TOML, JSON and YAML files: limits before memory is taken, one kind of error.
 
 A parser of the standard library answers a file of a few kilobytes with gigabytes, minutes or a
 RecursionError. Each text is scanned before it is parsed: size, nesting, names and digits.
@@ -44,7 +44,7 @@ class DocumentError(ValueError):
 
 
 def is_file(path: Path) -> bool:
-    """Whether there is a file; none has a name that the system refuses, as a too long one."""
+    """Return whether a file exists; False for a name that the system refuses (too long)."""
     try:
         return path.is_file()
     except (OSError, ValueError):
@@ -52,7 +52,7 @@ def is_file(path: Path) -> bool:
 
 
 def read_content(path: Path, name: str = "document_kib") -> bytes:
-    """The bytes of an ordinary file within a limit.
+    """Read the bytes of an ordinary file within a limit.
 
     Args:
         path: the file.
@@ -80,7 +80,7 @@ def read_content(path: Path, name: str = "document_kib") -> bytes:
 
 
 def read_toml(path: Path, form: str = "", finite: bool = True) -> dict[str, Any]:
-    """The document in a TOML file.
+    """Read the document in a TOML file.
 
     Args:
         path: the file.
@@ -94,7 +94,7 @@ def read_toml(path: Path, form: str = "", finite: bool = True) -> dict[str, Any]
 
 
 def parse_toml(content: bytes, file: str, form: str = "", finite: bool = True) -> dict[str, Any]:
-    """As `read_toml`, from the file's content and its name for messages."""
+    """Parse TOML as `read_toml` does, from the file's content; messages use its name."""
     check_limit(file, "toml_kib", len(content) / 1024)
     # tomllib does so too: positions count with line feeds alone.
     text = _decoded(content, file, "TOML").replace("\r\n", "\n")
@@ -119,7 +119,7 @@ def parse_toml(content: bytes, file: str, form: str = "", finite: bool = True) -
 def read_json(
     path: Path, name: str = "document_kib", own: bool = False, finite: bool = True
 ) -> Any:  # noqa: ANN401
-    """The value in a JSON file.
+    """Read the value in a JSON file.
 
     Args:
         path: the file.
@@ -134,7 +134,7 @@ def read_json(
 
 
 def parse_json(content: bytes, file: str, own: bool = False, finite: bool = True) -> Any:  # noqa: ANN401
-    """As `read_json`, from the file's content and its name for messages."""
+    """Parse JSON as `read_json` does, from the file's content; messages use its name."""
     text = _decoded(content, file, "JSON")
     _check_scan(file, _JSON_TEXT.sub(_blank, text))
 
@@ -152,7 +152,7 @@ def parse_json(content: bytes, file: str, own: bool = False, finite: bool = True
 
 
 def read_yaml(path: Path, finite: bool = True) -> Any:  # noqa: ANN401
-    """The value in a YAML file of one document; its tags and aliases make data alone.
+    """Read the value in a YAML file of one document; tags and aliases make only data.
 
     Args:
         path: the file.
@@ -166,7 +166,7 @@ def read_yaml(path: Path, finite: bool = True) -> Any:  # noqa: ANN401
 
 
 def parse_yaml(content: bytes, file: str, finite: bool = True) -> Any:  # noqa: ANN401
-    """As `read_yaml`, from the file's content and its name for messages."""
+    """Parse YAML as `read_yaml` does, from the file's content; messages use its name."""
     check_limit(file, "yaml_kib", len(content) / 1024)
     text = _decoded(content, file, "YAML")
     with _within_the_stack(file):

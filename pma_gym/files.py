@@ -1,4 +1,4 @@
-"""Files that are written whole or not at all, and the rule on where one may be written."""
+"""Atomic writing of files, and checks of output paths."""
 
 import os
 import tempfile
@@ -9,11 +9,11 @@ from pma_gym.partials import begin_partial, end_partial
 
 
 class OutputError(ValueError):
-    """A file that cannot be written; the message says which, why and the mend."""
+    """A file that cannot be written; the message names file, reason and fix."""
 
 
 def check_output(path: Path) -> None:
-    """Refuse a file that could not be written, before anything is computed for it.
+    """Refuse an output file that cannot be written, before any computation.
 
     The one rule of all commands: the folder exists and lets files be made; the file is new, or an
     ordinary file that may be written. Nothing is made or changed.
@@ -52,7 +52,7 @@ def _fault(path: Path) -> str:
 
 
 def replace_file(path: Path, content: bytes, private: bool = False) -> None:
-    """Write a file so that a reader sees the old one or the new one, never a part.
+    """Replace a file atomically: a reader sees the old or the new content, never a part.
 
     Args:
         path: the file; its folder exists.
@@ -63,7 +63,7 @@ def replace_file(path: Path, content: bytes, private: bool = False) -> None:
 
 
 def replace_files(contents: Mapping[Path, bytes], private: bool = False) -> None:
-    """Write files that belong together: a disk that fails or fills up leaves all the old ones.
+    """Replace several files together; if the disk fails or is full, all old ones stay.
 
     Only between the final steps, which write nothing, could new and old ones stand side by side.
     What killed processes left half-written in these folders is removed.

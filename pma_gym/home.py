@@ -1,4 +1,4 @@
-"""The user's home folder, where there is one, and what libraries need where there is none.
+"""The user's home folder, and a replacement for libraries where there is none.
 
 A container may run as a user without the variable HOME and without an entry in the list of users.
 """
@@ -12,7 +12,7 @@ from pma_gym.partials import begin_temporary_folder, end_partial
 
 
 def home_folder() -> Path | None:
-    """The user's home folder; None if this user has none."""
+    """Return the user's home folder, or None if there is none."""
     try:
         return Path.home()
     except RuntimeError:
@@ -20,7 +20,7 @@ def home_folder() -> Path | None:
 
 
 def temporary_folder() -> Path:
-    """A new folder for this process alone, removed at its end.
+    """Create a folder for this process only, removed at its end.
 
     Raises:
         OSError: there is no folder for temporary files.
@@ -31,7 +31,7 @@ def temporary_folder() -> Path:
 
 
 def give_matplotlib_a_folder() -> None:
-    """Without a home, Matplotlib before 3.11 cannot be imported unless MPLCONFIGDIR is set."""
+    """Set MPLCONFIGDIR without a home, else Matplotlib before 3.11 cannot be imported."""
     if "MPLCONFIGDIR" not in os.environ and home_folder() is None:
         with suppress(OSError):
             os.environ["MPLCONFIGDIR"] = str(temporary_folder())

@@ -1,4 +1,4 @@
-"""Limits on what is read from files, checked before the memory is taken.
+"""Limits on files that are read, checked before memory is taken.
 
 A file from a stranger may unpack to gigabytes. Every reader asks here, by the name of the limit, so
 that one table says what is read and one rule says how to raise it.
@@ -52,7 +52,7 @@ PREFIX = "PMA_GYM_MAX_"
 
 
 def limit(name: str) -> int:
-    """Value of a limit: the environment's, else the usual one.
+    """Return a limit: from the environment variable, else the default.
 
     Raises:
         LimitError: the environment's value is no positive whole number.
@@ -69,7 +69,7 @@ def limit(name: str) -> int:
 
 
 def check_limit(file: str, name: str, value: float) -> None:
-    """Refuse what is beyond a limit.
+    """Refuse a value beyond a limit.
 
     Args:
         file: the file's name, for the message.

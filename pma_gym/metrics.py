@@ -1,4 +1,4 @@
-"""The figures by which trials are judged: RMSE, percent of range, and a trial's regression.
+"""Metrics of trials: RMSE, percent of range, and regression lines.
 
 One definition for measured, simulated and controlled trials alike. Nothing here knows a unit:
 values in m give slopes in m/s and squares in m^2, values in deg give deg/s and deg^2.
@@ -21,7 +21,7 @@ PHASE_DURATION = 5.0
 
 
 def phase_times(phase: int = 0) -> NDArray[np.float64]:
-    """Times at which a phase is scored, counted from the start of the trial.
+    """Return the times at which a phase is scored, from the start of the trial.
 
     The 1923 samples outlast the 5 s by two, so phases overlap by 5 ms. The standard errors of
     tables 21 and 27-29 give the same rate and number but a mean time of 2.5000 s: there, each
@@ -36,7 +36,7 @@ def phase_times(phase: int = 0) -> NDArray[np.float64]:
 
 
 def rmse(error: ArrayLike) -> float:
-    """Root of the mean square of an error, over all of its samples.
+    """Compute the root mean square of an error over all samples.
 
     Args:
         error: actual minus ideal, any shape.
@@ -50,7 +50,7 @@ def rmse(error: ArrayLike) -> float:
 
 
 def percent_of_range(rmse: float, span: float) -> float:
-    """An RMSE as a percentage of the range that the task covers.
+    """Express an RMSE as a percentage of the task's range.
 
     >>> percent_of_range(1.92, 25)  # table 22, 150 kPa
     7.68
@@ -86,7 +86,7 @@ class Regression:
     def from_estimates(
         cls, slope: float, intercept: float, ss_error: float, time: ArrayLike | None = None
     ) -> "Regression":
-        """The regression that printed estimates describe.
+        """Reconstruct a regression from printed estimates.
 
         Args:
             slope: estimate of the slope (unit/s).
@@ -157,7 +157,7 @@ class Regression:
 
 
 def regression(time: ArrayLike, values: ArrayLike) -> Regression:
-    """Least-squares line of values on time.
+    """Fit a least-squares line to values over time.
 
     Args:
         time: the phase's own time (s), shape (n,), n >= 3, not all equal.
@@ -189,7 +189,7 @@ def regression(time: ArrayLike, values: ArrayLike) -> Regression:
 def rmse_from_regression(
     line: Regression, ideal_slope: float, ideal_intercept: float = 0.0
 ) -> float:
-    """RMSE of a trial against a straight ideal, from the trial's regression alone.
+    """Compute a trial's RMSE against a straight ideal from its regression.
 
         RMSE^2 = ss_error / n + mean of (intercept error + slope error * time)^2
 
@@ -207,7 +207,7 @@ def rmse_from_regression(
 
 
 def line_error(line: Regression, ideal_slope: float, ideal_intercept: float = 0.0) -> float:
-    """The part of a trial's RMSE that lies in its regression line: line less ideal, rms.
+    """Compute the line part of a trial's RMSE: rms of regression line less ideal.
 
         RMSE^2 = line_error^2 + scatter^2
 

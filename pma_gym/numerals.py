@@ -9,7 +9,7 @@ _LONGEST = 400
 
 
 def parse_number(text: str) -> float | None:
-    """The number that a text holds, None if it holds none.
+    """Parse the number in a text; None if there is none.
 
     A sign, ASCII digits with a decimal point, an exponent; blanks around it do not count. Neither
     `nan`, `inf`, `1_000`, digits of other scripts nor a number beyond the doubles (1e400) is one.
@@ -26,7 +26,7 @@ def parse_number(text: str) -> float | None:
 
 
 def parse_numbers(text: str) -> list[float] | None:
-    """The numbers between the commas of a text, None if one of them is none.
+    """Parse numbers separated by commas; None if one of them is not a number.
 
     Example:
         >>> parse_numbers("150, 300,"), parse_numbers("150,nan"), parse_numbers("")

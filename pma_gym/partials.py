@@ -1,4 +1,4 @@
-"""Names of files that are being written, and removal of those that a killed process left behind.
+"""Names of partially written files, and removal of those that killed processes left.
 
 A name carries the machine and the process that writes it, so that another process can tell a file
 in progress from a leftover.
@@ -32,7 +32,7 @@ _in_progress: set[str] = set()
 
 
 def begin_partial(path: Path) -> Path:
-    """A new name beside a file, under which to write its next content.
+    """Return a new name beside a file, to write its next content under.
 
     Args:
         path: the file or folder that is to be replaced.
@@ -48,7 +48,7 @@ def begin_partial(path: Path) -> Path:
 
 
 def end_partial(partial: Path) -> None:
-    """Remove what is left under a name of `begin_partial`; nothing after the rename."""
+    """Remove the partial file of `begin_partial`, if it was not renamed."""
     try:
         remove(partial)
     finally:
@@ -56,7 +56,7 @@ def end_partial(partial: Path) -> None:
 
 
 def begin_temporary_folder(name: str) -> Path:
-    """A new folder for this user alone among the temporary ones; give it to `end_partial`.
+    """Create a temporary folder for this user only; remove it by `end_partial`.
 
     It is named as partial files are, so that the next one of any name removes what a killed process
     left.
@@ -72,7 +72,7 @@ def begin_temporary_folder(name: str) -> Path:
 
 
 def clean_folder(folder: Path) -> None:
-    """Remove what killed processes left in a folder.
+    """Remove partial files that killed processes left in a folder.
 
     A file of a live process stays. A file of another machine, or without a process in its name,
     stays for a day: whether its writer lives cannot be seen from here.
@@ -90,7 +90,7 @@ def clean_folder(folder: Path) -> None:
 
 
 def is_leftover(partial: Path) -> bool:
-    """Whether nobody writes a partial file or folder any more; False for any other name."""
+    """Return whether a partial file or folder has no writer; False for other names."""
     match = _FORM.fullmatch(partial.name)
     if match is None:
         return False
@@ -107,7 +107,7 @@ def is_leftover(partial: Path) -> bool:
 
 
 def remove(path: Path) -> None:
-    """Remove a file, a link or a whole folder; none of this name is no error."""
+    """Remove a file, a link or a folder with its contents; a missing one is no error."""
     if path.is_dir() and not path.is_symlink():
         shutil.rmtree(path)
     else:

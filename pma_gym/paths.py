@@ -1,4 +1,4 @@
-"""Whether a text names a file, and why a file that was named cannot be read."""
+"""Recognition of file paths, and reasons why a file cannot be read."""
 
 import difflib
 import os
@@ -6,7 +6,7 @@ from pathlib import Path
 
 
 def is_path(source: str | Path) -> bool:
-    """Whether text names a file, not something shipped: it has a separator or ends in .toml.
+    """Return whether text is a path (a separator, or ending .toml), not a shipped name.
 
     >>> [is_path(text) for text in ("station", "station.toml", "mine/station")]
     [False, True, True]
@@ -17,7 +17,7 @@ def is_path(source: str | Path) -> bool:
 
 
 def missing_file(path: Path, ending: str = ".toml") -> str:
-    """Why a path cannot be read as a file of one ending, and what to do; empty if it can be.
+    """Return why a path is not a readable file with one ending, and the fix; empty if it is.
 
     Args:
         path: as it was given.

@@ -1,4 +1,4 @@
-"""Pickles of what users give: functions too, by value where no other process could import them.
+"""Pickling of users' objects: functions by value where other processes cannot import them.
 
 Pickle sends a function by the name of its module, which fails for a lambda, for a function inside
 another one and, in another process, for one of a notebook. Gymnasium sends environments to its
@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 
 class Packed(NamedTuple):
-    """A value as its own pickle.
+    """A value stored as a pickle.
 
     Attributes:
         data: what `pickle.loads` makes the value of.
@@ -19,12 +19,12 @@ class Packed(NamedTuple):
     data: bytes
 
     def value(self) -> object:
-        """The value; as trustworthy as the pickle that it came in."""
+        """Unpickle the value; it is as trustworthy as the pickle around it."""
         return pickle.loads(self.data)
 
 
 def packed(name: str, value: object) -> Packed:
-    """A value ready for pickle.
+    """Prepare a value for pickle.
 
     Args:
         name: what users call it, such as an option's name.

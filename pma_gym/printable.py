@@ -14,7 +14,7 @@ _UNSAFE = re.compile(
 
 
 def printable(text: str) -> str:
-    r"""A text with escapes in place of what controls a terminal or is no text.
+    r"""Replace control codes and invalid characters of a text by escapes.
 
     Example:
         >>> printable("a\x1b[31mb"), printable("\udce9t\u00e9")

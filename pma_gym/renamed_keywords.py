@@ -1,4 +1,4 @@
-"""Keyword arguments by their old names: they work, with a warning that says the new name.
+"""Old names of keyword arguments: they work, with a warning that names the new one.
 
 Users' scripts and effect files name arguments. An old name stands beside the function or class that
 takes it, and nowhere else.
@@ -15,7 +15,7 @@ Target = TypeVar("Target", bound=Callable)
 def old_keywords(
     renamed: Mapping[str, str], values: Mapping[str, Mapping[Any, Any]] | None = None
 ) -> Callable[[Target], Target]:
-    """Let a function or class take keyword arguments by their old names too.
+    """Accept old names of keyword arguments of a function or class.
 
     Args:
         renamed: new names by old ones.

@@ -1,4 +1,4 @@
-"""Modules by their old names: they import, with a deprecation warning that says the new name.
+"""Old names of modules: they import, with a deprecation warning that names the new one.
 
 Users' imports and the pickles of trained policies name modules. An old name stands in one table
 here, and no file is left in its place.
@@ -55,11 +55,11 @@ class _RenamedLoader(Loader):
         self._new = new
 
     def create_module(self, spec: ModuleSpec) -> ModuleType:
-        """An empty module by the old name."""
+        """Create an empty module with the old name."""
         return ModuleType(spec.name)
 
     def exec_module(self, module: ModuleType) -> None:
-        """Warn, import the new module and look every name up there."""
+        """Warn, import the new module and redirect every name to it."""
         old = module.__name__
         warnings.warn(
             f"module {old} is now {self._new}; import it by that name",
@@ -91,13 +91,13 @@ class _RenamedFinder(MetaPathFinder):
     def find_spec(
         self, fullname: str, path: Sequence[str] | None, target: ModuleType | None = None
     ) -> ModuleSpec | None:
-        """The spec of an old name, None of any other."""
+        """Return the spec of an old name, None for any other."""
         new = self.names.get(fullname)
         return None if new is None else ModuleSpec(fullname, _RenamedLoader(new))
 
 
 def find_renamed_modules(names: Mapping[str, str] = RENAMED_MODULES) -> None:
-    """Let old module names be imported; once a process.
+    """Install the importer of old module names; once a process.
 
     Args:
         names: new names by old ones.

@@ -1,4 +1,4 @@
-"""Classes, functions and attributes by their old names: they work, with a deprecation warning."""
+"""Old names of classes, functions and attributes: they work, with a deprecation warning."""
 
 import sys
 import warnings
@@ -7,7 +7,7 @@ from typing import Any
 
 
 def warn_renamed(what: str, new: str, stacklevel: int = 3) -> None:
-    """Say that a name is an old one, to whoever uses it.
+    """Warn the caller that a name is deprecated.
 
     Args:
         what: the old name, with what it is of.
@@ -18,7 +18,7 @@ def warn_renamed(what: str, new: str, stacklevel: int = 3) -> None:
 
 
 def renamed_names(module: str, names: Mapping[str, Any]) -> Callable[[str], Any]:
-    """The `__getattr__` of a module some of whose names have changed.
+    """Make the `__getattr__` of a module with renamed names.
 
     Args:
         module: the module's name.
@@ -36,7 +36,7 @@ def renamed_names(module: str, names: Mapping[str, Any]) -> Callable[[str], Any]
 
 
 def renamed_attribute(old: str, new: str) -> property:
-    """A property by an attribute's old name.
+    """Make a property for an attribute's old name.
 
     Args:
         old: the old name.

@@ -1,4 +1,4 @@
-"""Terminals that no name can harm: consoles and streams that show control codes as escapes."""
+"""Consoles and streams that show control codes in text as escapes."""
 
 import sys
 from collections.abc import Iterable, Iterator
@@ -15,7 +15,7 @@ WIDTH = 160
 
 
 class SafeConsole(Console):
-    """A Rich console that shows text as it is: no markup, no emoji codes, no control codes."""
+    """A Rich console for plain text: no markup, no emoji codes, no control codes."""
 
     def __init__(self, **options: Any) -> None:
         super().__init__(**{"markup": False, "emoji": False, **options})
@@ -23,14 +23,14 @@ class SafeConsole(Console):
     def render(
         self, renderable: RenderableType, options: ConsoleOptions | None = None
     ) -> Iterable[Segment]:
-        """As Rich does, text made printable; the console's own control codes pass."""
+        """Render as Rich does, with control codes in text escaped."""
         for segment in super().render(renderable, options):
             plain = segment.control is None
             yield segment._replace(text=printable(segment.text)) if plain else segment
 
 
 def table_console() -> SafeConsole:
-    """Where tables go; as wide as they need where nobody watches."""
+    """Create the console for tables; without a terminal, as wide as the tables."""
     console = SafeConsole()
     return console if console.is_terminal else SafeConsole(width=WIDTH)
 
@@ -56,7 +56,7 @@ class _SafeStream:
 
 @contextmanager
 def safe_streams() -> Iterator[None]:
-    """Standard output and error that no name can harm, while a command runs.
+    """Escape control codes on standard output and error inside the context.
 
     Strict ASCII or cp1252 terminals get escapes for characters that they lack, not an error.
     """

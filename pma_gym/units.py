@@ -74,7 +74,7 @@ SI_FACTORS: dict[str, float] = {
 
 @cache
 def suffix(unit: str) -> str:
-    """The ending that says a unit in a name: `N/mm` gives `n_per_mm`; `1` gives nothing.
+    """Return the ending of a name for a unit: `N/mm` gives `n_per_mm`, `1` nothing.
 
     >>> suffix("N s/mm"), suffix("kg m^2"), suffix("%"), suffix("1/kPa"), suffix("1")
     ('n_s_per_mm', 'kg_m2', 'percent', 'per_kpa', '')
@@ -87,7 +87,7 @@ def suffix(unit: str) -> str:
 
 
 def with_unit(number: str, unit: str) -> str:
-    """A number in words with its unit, which a pure number has none of.
+    """Format a number with its unit; a pure number has none.
 
     >>> with_unit("0.5", "N/mm"), with_unit("0.5", "1")
     ('0.5 N/mm', '0.5')
@@ -129,11 +129,11 @@ class Quantity:
 
     @property
     def factor(self) -> float:
-        """Value in SI of one unit in files."""
+        """SI value of one file unit."""
         return SI_FACTORS[self.unit]
 
     def name(self, stem: str) -> str:
-        """The name in files of the parameter that the code calls `stem`.
+        """Return the name in files of the parameter `stem`.
 
         >>> Quantity("N/kPa", 0, 10, "example").name("slope")
         'slope_n_per_kpa'
@@ -142,15 +142,15 @@ class Quantity:
         return f"{stem}_{ending}" if ending else stem
 
     def to_si(self, value: float) -> float:
-        """The value in SI of one given in the unit in files."""
+        """Convert a value from the file unit to SI."""
         return value * self.factor
 
     def from_si(self, value: float) -> float:
-        """The value in the unit in files of one given in SI."""
+        """Convert a value from SI to the file unit."""
         return value / self.factor
 
     def check(self, name: str, value: float) -> None:
-        """Refuse a value in file units outside the bounds.
+        """Refuse a value (in file units) outside the bounds.
 
         Raises:
             ValueError: names the parameter, the range, the unit, what came and the mend.

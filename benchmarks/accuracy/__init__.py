@@ -1,1 +1,1 @@
-"""How exact the simulation is: against scipy, and in limits that the equations approach."""
+"""Accuracy of the simulation: against scipy, and in limits of the equations."""

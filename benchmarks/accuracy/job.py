@@ -1,4 +1,4 @@
-"""How exact the simulation is, and at what price: the integrator against scipy, and limits.
+"""Accuracy and cost of the simulation: the integrator against scipy, and limits.
 
 Three trials (`reference`) run on each model at three pressures, at a ladder of tolerances. Errors
 are shares of each state's range in the trial; the price is counted in attempts at internal steps.
@@ -65,7 +65,7 @@ POSITIONS = ("contraction", "angle", "extension", "servo")
 
 @dataclass(frozen=True)
 class Error:
-    """What a tolerance gives, and what it costs.
+    """Error and computing time at a tolerance.
 
     Attributes:
         tolerance: largest error of an internal step, as a share of the states' scales.
@@ -91,7 +91,7 @@ class Error:
 
     @property
     def met(self) -> bool:
-        """Whether both limits are kept."""
+        """Whether the error keeps both limits."""
         return self.states[self.worst_state] <= STATE_LIMIT and self.position <= POSITION_LIMIT
 
     @property

@@ -139,7 +139,7 @@ def _released(plant: Plant, pressure: float) -> Condition:
 
 
 def motor_inertia_effect(inertia: float, pressure: float = 400e3) -> float:
-    """How much the motor's inertia changes the cascade's step response.
+    """Compute the change of the cascade's step response by the motor's inertia.
 
     Args:
         inertia: of the motor (kg m^2), at a damping ratio of 0.7.
@@ -156,7 +156,7 @@ def motor_inertia_effect(inertia: float, pressure: float = 400e3) -> float:
 
 
 def rotor_inertia_effect(factor: float, model: str = "station", pressure: float = 400e3) -> float:
-    """How much another inertia of the rotor changes the station's response to a step of 1 V.
+    """Compute the change of the station's 1 V step response by another rotor inertia.
 
     Args:
         factor: on the model's own inertia, itself an assumption.

@@ -1,4 +1,4 @@
-"""How closely a trial can be followed at all: what is left to controllers that know everything.
+"""Least tracking error that any controller can reach, even with full knowledge.
 
 The drive pulls and cannot push. On the way back the muscle pulls the cable out, with what force it
 has left after hysteresis, dry friction and damping; at the end the rotor coasts into the cable's

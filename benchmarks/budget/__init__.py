@@ -1,1 +1,1 @@
-"""Why open-loop control misses: `python -m benchmarks budget`."""
+"""Error budget of open-loop control: `python -m benchmarks budget`."""

@@ -91,7 +91,7 @@ def without(model: Model, *parts: str) -> Model:
 
 @dataclass(frozen=True)
 class Motion:
-    """What is wanted of the muscle's end at some times; arrays of one shape.
+    """Prescribed motion of the muscle's end at given times; arrays of one shape.
 
     Attributes:
         extension: y (m).

@@ -46,7 +46,7 @@ def waterfall_rows(budgets: Sequence[Budget], phase: str) -> Rows:
 
 
 def alone_rows(budgets: Sequence[Budget], phase: str) -> Rows:
-    """Change of RMSE when one thing alone is taken away or changed."""
+    """Tabulate the change of RMSE when a single cause is removed or changed."""
 
     def change(value: Callable[[Budget], float]) -> list[str]:
         return [_signed(value(b) - b.printed[phase]) for b in budgets]

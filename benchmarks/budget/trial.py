@@ -36,7 +36,7 @@ WITHOUT = {
 
 @dataclass(frozen=True)
 class Budget:
-    """Why the printed feed-forward misses what it misses in one trial; RMSE in mm or deg.
+    """Error budget of the printed feed-forward in one trial; RMSE in mm or deg.
 
     Attributes:
         task: `displacement` or `rotation`.
@@ -77,7 +77,7 @@ class Budget:
         return self.resultss[frozenset(self.causes) - {cause}][phase]
 
     def share(self, cause: str, phase: str) -> float:
-        """What a fault adds to the mean square (mm^2 or deg^2), the mean over all orders.
+        """Return a fault's share of the mean square (mm^2 or deg^2), averaged over all orders.
 
         Shapley's value: shares add up to the difference of the mean squares with all faults and
         with none, and depend on no order. Negative where a fault makes up for others.

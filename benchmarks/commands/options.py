@@ -1,4 +1,4 @@
-"""What the commands share: options, where results go, and how one refuses."""
+"""Options, result folders and refusals that the commands share."""
 
 import sys
 from pathlib import Path
@@ -60,7 +60,7 @@ def writable_out(out: Path | None) -> Path | None:
 
 
 def listed(text: str) -> list[str]:
-    """What stands between commas."""
+    """Split a text at commas."""
     return [part.strip() for part in text.split(",") if part.strip()]
 
 

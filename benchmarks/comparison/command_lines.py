@@ -8,7 +8,7 @@ from benchmarks.suites.suite import FrozenSuite
 
 
 def run_command(suite: FrozenSuite, folder: Path) -> str:
-    """What runs a suite into a folder.
+    """Return the command that runs a suite into a folder.
 
     >>> from benchmarks.suites.frozen import frozen_suite
     >>> run_command(frozen_suite("nominal"), Path("results/nominal"))
@@ -20,12 +20,12 @@ def run_command(suite: FrozenSuite, folder: Path) -> str:
 
 
 def report_command(suite: FrozenSuite, folder: Path) -> str:
-    """What writes the page of a folder's results."""
+    """Return the command that writes the report of a folder."""
     return _joined("report", suite.source, *_folder("--results", suite, folder))
 
 
 def remove_command(name: str, suite: FrozenSuite, folder: Path) -> str:
-    """What takes a controller's rows out of a folder's journal."""
+    """Return the command that removes a controller's rows from a folder's journal."""
     results = [] if folder.parent == RESULTS else ["--results", str(folder.parent)]
     return _joined("remove", name, "--suite", suite.source, *results)
 

@@ -97,7 +97,7 @@ def print_clipping(rows: Sequence[Row], console: Console) -> None:
 
 
 def print_failures(rows: Sequence[Row], console: Console) -> None:
-    """Why cases failed, if any did: each reason once, the commonest first."""
+    """Print why cases failed: each reason once, the commonest first."""
     reasons = sorted(failures(rows).items(), key=lambda item: -len(item[1]))
     for reason, names in reasons[:MOST_REASONS]:
         more = f" and {len(names) - 1} more" if len(names) > 1 else ""

@@ -81,7 +81,7 @@ def study_table(study: str, rows: Sequence[Comparison], notes: Mapping[str, int]
 
 
 def counts_table(rows: Sequence[Comparison]) -> Table:
-    """How many figures of each study are equal, rounded and wrong in print."""
+    """Count figures of each study that are equal, rounded and misprinted."""
     table = Table(title="All studies", title_justify="left")
     table.add_column("study")
     for verdict in VERDICTS:

@@ -17,7 +17,7 @@ FEEDFORWARDS = ("serres_replay", "serres_feedforward", "improved_feedforward")
 
 @dataclass(frozen=True)
 class Order:
-    """Which voltages are wanted.
+    """Request for voltages.
 
     Attributes:
         controller: one of `FEEDFORWARDS`.

@@ -6,7 +6,7 @@ from benchmarks.executors.executor import Executor, ThisProcess
 
 
 class ExecutorName(StrEnum):
-    """What `--executor` takes."""
+    """Values of `--executor`."""
 
     LOCAL = "local"
     RAY = "ray"

@@ -19,7 +19,7 @@ class ExecutorMissing(RuntimeError):
 
 
 class Executor(Protocol):
-    """Where pieces of work run.
+    """Runs pieces of work.
 
     Attributes:
         jobs: how many at a time.
@@ -84,7 +84,7 @@ def run_all(
 def run_or_raise(
     works: Sequence[Work], executor: Executor, on_done: Callable[[int, Any], None]
 ) -> None:
-    """As `run_all`, for works that must all succeed.
+    """Run pieces of work as `run_all` does, and raise if one fails.
 
     Raises:
         Exception: what the first piece that failed raised; the others are ended.

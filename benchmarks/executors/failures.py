@@ -1,4 +1,4 @@
-"""What a piece of work results in where its process cannot say it."""
+"""Results for pieces of work whose process died."""
 
 import signal
 

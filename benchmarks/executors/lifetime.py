@@ -1,4 +1,4 @@
-"""How long a worker process lives: not longer than its parent, and through Ctrl-C."""
+"""Lifetime of worker processes: they end with their parent, and survive Ctrl-C."""
 
 import ctypes
 import os

@@ -91,7 +91,7 @@ class Background(Generic[Result]):
             self._future = self._pool.schedule(run_packed, (pickle.dumps(work),))
 
     def result(self) -> Result:
-        """What the work returned.
+        """Return the result of the work.
 
         Raises:
             Exception: whatever it raised.

@@ -24,7 +24,7 @@ def run_packed(work: bytes) -> bytes:
 
 
 def unpacked(content: bytes) -> object:
-    """What a piece of work returned, or the exception that it raised."""
+    """Unpack what a piece of work returned, or the exception that it raised."""
     try:
         return pickle.loads(content)
     except Exception as error:

@@ -1,4 +1,4 @@
-"""Which configurations are shown and searched: what is given, and common sizes for the rest."""
+"""Choice of configurations to show and search: given values, common sizes for the rest."""
 
 from dataclasses import dataclass
 from itertools import product

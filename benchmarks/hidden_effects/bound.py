@@ -1,4 +1,4 @@
-"""Where the data, not the method, is the limit: what a test that knows everything could tell.
+"""Bound by the data, not the method: the power of a test that knows everything else.
 
     python -m benchmarks.hidden_effects.bound --cases D
 

@@ -41,7 +41,7 @@ class JobError(ValueError):
 
 @dataclass(frozen=True)
 class Order:
-    """What is asked for.
+    """Request for a campaign.
 
     Attributes:
         block: the block.

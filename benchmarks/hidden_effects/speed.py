@@ -1,4 +1,4 @@
-"""How long a diagnosis takes: three sizes of data set, simulated by the package's own station.
+"""Duration of a diagnosis: three sizes of data set, simulated by the package's station.
 
 Each data set hides hysteresis in the station without dry friction. The kernels of all structures
 are compiled, or read from the disk, before the clock starts: that is paid once on a machine, and

@@ -1,4 +1,4 @@
-"""Whether the station needs creep: I3's load cycle with a quick branch of it, judged left out.
+"""Test for creep of the station: I3's load cycle with a fast branch, on left-out pressures.
 
 Load cycle of I3 at the pace of its ramps, quasi-static but for what is viscous: with F(P, x) the
 static force, H z the hysteresis, B the damping, f the force in the branch (`effects.creep`),
@@ -59,7 +59,7 @@ def branch_of(model: Model) -> Branch:
 def load_cycle_with_creep(
     model: Model, pressure: np.ndarray, load: np.ndarray
 ) -> LoadCycleReadings:
-    """What a model predicts for I3's load cycle, with its branch of creep.
+    """Predict I3's load cycle by a model with a branch of creep.
 
     Args:
         model: a station's model with hysteresis and damping, and creep or none.
@@ -80,7 +80,7 @@ def load_cycle_with_creep(
 
 
 class CreepFold(NamedTuple):
-    """What a left-out pressure says of creep.
+    """Result of the test for creep at a left-out pressure.
 
     Attributes:
         stiffness: of the branch, fitted without that pressure (N/mm).
@@ -94,14 +94,14 @@ class CreepFold(NamedTuple):
 
 
 class Decision(NamedTuple):
-    """Whether creep is asked for, and why in words."""
+    """Decision for or against creep, with the reason in words."""
 
     asked: bool
     words: str
 
 
 def decided(folds: Sequence[CreepFold]) -> Decision:
-    """Whether eleven left-out pressures ask for creep, by the rule above."""
+    """Decide by eleven left-out pressures whether the model needs creep, by the rule above."""
     stiffness, without, with_creep = np.array(folds).T
     count = len(folds)
     error = np.sqrt((count - 1) / count * np.sum((stiffness - stiffness.mean()) ** 2))

@@ -61,7 +61,7 @@ def figures(folds: list[LeftOut]) -> dict[str, float]:
 
 
 def unexplained(model: Model, data: StationLimits, steps: PressureSteps) -> list[str]:
-    """What the model leaves unexplained in I1, I2 and I3, in words with figures."""
+    """Describe the residuals of the model in I1, I2 and I3, with figures."""
     parts = statics.residuals(model, data)
     lines_ = [_trend_over_repeats(data), _scatter_at_rest(parts["no_load"], data)]
     loop = parts["extension"] - parts["returned"]

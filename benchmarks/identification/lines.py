@@ -36,7 +36,7 @@ def regulator_line(data: StationLimits) -> dict[str, float]:
 
 
 class Pulley(NamedTuple):
-    """What rotation is made of: radius (m), cable stiffness (N/m), slack (m)."""
+    """Parameters of rotation: radius (m), cable stiffness (N/m), slack (m)."""
 
     radius: float
     stiffness: float

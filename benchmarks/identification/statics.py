@@ -55,7 +55,7 @@ STEP_WEIGHT = 4.0
 
 
 class LoadCycleReadings(NamedTuple):
-    """What I3's load cycle gives, arrays of shape (n,) in m: x0, x0 - x1 and x2 - x1."""
+    """Readings of I3's load cycle, arrays of shape (n,) in m: x0, x0 - x1 and x2 - x1."""
 
     no_load: np.ndarray
     extension: np.ndarray
@@ -63,7 +63,7 @@ class LoadCycleReadings(NamedTuple):
 
 
 def load_cycle(model: Model, pressure: np.ndarray, load: np.ndarray) -> LoadCycleReadings:
-    """What a model predicts for I3's load cycle.
+    """Predict I3's load cycle by a model.
 
     Args:
         model: a station's model with hysteresis and damping.
@@ -116,7 +116,7 @@ def residuals(
 def weighted(
     model: Model, data: StationLimits, steps: PressureSteps, predict: Predict = load_cycle
 ) -> np.ndarray:
-    """What a fit lowers: residuals of I3 (mm) and of I2, by their weights; those that are known."""
+    """Return the weighted residuals of a fit: of I3 (mm) and of I2, where measured."""
     parts = residuals(model, data, predict)
     loop = parts["extension"] - parts["returned"]
     all_parts = (

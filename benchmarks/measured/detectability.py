@@ -1,4 +1,4 @@
-"""What tables I2 and I3 cannot tell, and which experiments would."""
+"""Effects that tables I2 and I3 cannot detect, and experiments that can."""
 
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -110,7 +110,7 @@ def _compared(held: Sequence[Array], logged: Sequence[Logged]) -> dict[str, Arra
 
 
 def limit_errors(model: Model, data: Dataset) -> dict[str, Array]:
-    """Predicted less measured of I3's trials, from the commands alone, by `FIGURES` and `AT_LOAD`.
+    """Compute predicted less measured of I3's trials from commands, by `FIGURES` and `AT_LOAD`.
 
     Args:
         model: as it is.

@@ -22,7 +22,7 @@ PHASE_NAMES = {
 
 @dataclass(frozen=True)
 class Replay:
-    """How far a model's replay lies from what was measured in one phase.
+    """Difference of a model's replay from the measured trial in one phase.
 
     Attributes:
         task: displacement or rotation.

@@ -177,7 +177,7 @@ def _with(model: Model, explanation: Explanation) -> Model:
 
 
 def alike(explanations: Sequence[Explanation]) -> list[Explanation]:
-    """Explanations that cannot be told from the best."""
+    """Return explanations that are not distinguishable from the best."""
     least = min(each.left_out_mm for each in explanations)
     return [each for each in explanations if each.left_out_mm <= LIKE * least]
 

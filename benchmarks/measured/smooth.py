@@ -1,4 +1,4 @@
-"""How well a smooth function of the commands does on pressures that it has not seen.
+"""Error of a smooth function of the commands on left-out pressures.
 
 It knows no physics and takes no more than smoothness: an error that a model should at least reach.
 What it misses beyond the repeats may be rough in the commands (a ripple of the motor), change from

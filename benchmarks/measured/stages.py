@@ -36,7 +36,7 @@ _RENAMED = {"found": "explanations", "blind": "not_detectable"}
 
 @cache
 def fingerprint() -> str:
-    """Of all code that a stage depends on: the package's, the job's, and the replay's."""
+    """Compute the fingerprint of all code that a stage uses: package, job and replay."""
     own = sorted(Path(__file__).parent.glob("*.py"))
     others = [ROOT / "benchmarks" / f"{name}.py" for name in ELSEWHERE]
     return code_digest_with([*own, *others, ROOT / "benchmarks/suites/reproduction.toml"])
@@ -67,7 +67,7 @@ class Stages:
         return self.folder / "journal" / self.code
 
     def kept(self, name: str, asked: str, made: Callable[..., T]) -> T | None:
-        """What is there of a stage, if it answers this question; None otherwise.
+        """Read the stored result of a stage if its fingerprint agrees, else None.
 
         Args:
             name: of the stage.

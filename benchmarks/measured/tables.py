@@ -114,7 +114,7 @@ MOST_SHOWN = 8
 
 
 def reverse_text(result: Measured) -> Iterator[str]:
-    """What explains the misfit, and what cannot be told from it."""
+    """Describe explanations of the misfit, and those not distinguishable from them."""
     for explanations in result.reverse:
         plain = next(each for each in explanations if each.name == NOTHING)
         yield from _hypothesis_text(explanations, plain)
@@ -177,7 +177,7 @@ REPLAY_HEADER = ("model", "slope", "intercept", "mean", "mean, signed", "RMSE", 
 
 
 def experiment_text(result: Measured) -> list[str]:
-    """What to measure next, in words."""
+    """Describe the next experiment."""
     words = []
     for number, each in enumerate(result.rounds, 1):
         following = each.next_experiment
@@ -244,7 +244,7 @@ def print_measured(result: Measured, console: Console) -> None:
 
 
 def verdict_text(result: Measured) -> Iterator[str]:
-    """What was aimed at, and what was reached."""
+    """Describe the targets and the results."""
     first, last = result.steps[0], result.steps[-1]
     got = last.unseen["extension_mm"]
     met = "met" if got <= TARGET_MM else "MISSED"

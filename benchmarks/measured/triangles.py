@@ -48,7 +48,7 @@ class Triangle:
         )
 
     def contraction(self, model: Model) -> np.ndarray:
-        """What a model does in the last period (m), shape (n,)."""
+        """Simulate the contraction in the last period (m), shape (n,)."""
         count = round(CYCLES * self.period_s * RATE_HZ)
         time = np.arange(count + 1) / RATE_HZ
         phase = np.mod(time / self.period_s, 1.0)

@@ -43,7 +43,7 @@ class Step:
 
     @property
     def digest(self) -> str:
-        """Of its commands and of all that it depends on."""
+        """The digest of its commands and of all dependencies."""
         parts = [" ".join(words) for words in self.commands]
         return hashlib.sha256("\n".join([*parts, *map(content, self.depends)]).encode()).hexdigest()
 

@@ -77,7 +77,7 @@ def _policies(root: Path) -> Iterator[tuple[str, float]]:
 
 
 def compared(old: Mapping[str, float], new: Mapping[str, float]) -> list[tuple[str, str, str, str]]:
-    """Rows of name, old, new and change in percent; those alone that moved or are new."""
+    """Return rows of name, old, new and change in percent, for changed and new figures."""
     rows = []
     for name in dict.fromkeys([*old, *new]):
         before, after = old.get(name), new.get(name)

@@ -94,7 +94,7 @@ def percent_of(task: str) -> float:
 
 
 def measures(tasks: Iterable[str]) -> list[Measure]:
-    """What controllers are compared by in these tasks.
+    """Return the measures by which controllers are compared in these tasks.
 
     Kind of task by kind of task; phase III apart; references that the dissertation did not have,
     of a kind that it had, apart as well. Of an exercise whose speed is prescribed every phase by
@@ -199,7 +199,7 @@ class SuiteRecord:
         return (*self.suite.entries, *(Entry(ControllerSpec(name)) for name in others))
 
     def done(self, entry: Entry) -> tuple[int, int]:
-        """How many of a controller's cases have a row, and how many there are."""
+        """Count a controller's cases with a row, and all of its cases."""
         wanted = [e for e in self.suite.episodes if entry.does(e.task)]
         return sum((entry.spec.name, e) in self.rows for e in wanted), len(wanted)
 
@@ -235,5 +235,5 @@ class SuiteRecord:
 
 
 def is_bound(name: str) -> bool:
-    """Whether a controller may see the true plant: no rival, but what rivals are measured by."""
+    """Return whether a controller sees the true plant: a bound for the others, not a rival."""
     return ControllerSpec(name).is_bound

@@ -46,7 +46,7 @@ class Leaderboard:
 
     @cached_property
     def labels(self) -> dict[str, str]:
-        """What people call the controllers, by name, in the suite's order."""
+        """The controllers' labels by name, in the suite's order."""
         titles = {name: entry["title"] for name, entry in self.info.get("contenders", {}).items()}
         entries = (entry.spec for entry in self.record.entries)
         return {each.name: each.title or titles.get(each.name, each.name) for each in entries}
@@ -82,7 +82,7 @@ class Leaderboard:
         )
 
     def whole(self, standings: Standings) -> bool:
-        """Whether a measure's standings rest on all of its cases."""
+        """Return whether a measure's standings use all of its cases."""
         tasks = standings.errors.measure.tasks
         wanted = sum(episode.task in tasks for episode in self.suite.episodes)
         return len(standings.errors.episodes) == wanted and bool(standings.errors.names)
@@ -125,7 +125,7 @@ class Leaderboard:
 
     @cached_property
     def obstacles(self) -> dict[tuple[str, float], str]:
-        """Why the nominal actuator cannot follow, by task and pressure (kPa), where it cannot."""
+        """Why the nominal actuator cannot follow, by task and pressure (kPa)."""
         trials = dict.fromkeys((e.task, e.pressure_kpa) for e in self.suite.episodes)
         model = self.suite.nominal
         known = {(t, kpa): infeasibility_reason(task_of(t), model, 1e3 * kpa) for t, kpa in trials}

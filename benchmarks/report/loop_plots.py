@@ -37,7 +37,7 @@ COLUMN_IN, AXIS_IN = 3.4, 0.8
 
 
 def loop_title(conditions: Sequence[Condition]) -> str:
-    """What people call the task of loops: its name, and the load that the regulator works against.
+    """Return the label of the loops' task: its name, and the load on the regulator.
 
     >>> from pma_gym.plant.model import load_model
     >>> from pma_gym.tasks import EVERY_TASK

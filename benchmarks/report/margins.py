@@ -106,7 +106,7 @@ def conditions(
 
 
 def is_linear(controller: Controller) -> bool:
-    """Whether a controller says what its linear law is."""
+    """Return whether a controller provides its linear law."""
     return isinstance(controller, LinearController)
 
 
@@ -225,7 +225,7 @@ def worst(loops_: Sequence[Loop]) -> Margins:
 
 
 def reference_step(loop: Loop, duration: float) -> tuple[NDArray, NDArray]:
-    """Times (s) and measured position after a step of the reference, through the feedback alone."""
+    """Simulate a step of the reference with feedback only: times (s), measured position."""
     return _step(control.feedback(loop.plant * loop.law, 1), duration)
 
 

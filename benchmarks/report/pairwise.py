@@ -69,7 +69,7 @@ class Rank(NamedTuple):
 
 @dataclass(frozen=True)
 class Ranking:
-    """Who is better than whom beyond doubt.
+    """Controllers ordered by significant differences of pairs.
 
     Attributes:
         ranks: of the controllers, in their order.

@@ -1,4 +1,4 @@
-"""Who is drawn how: one colour and one marker for each controller, in every picture."""
+"""Plot styles: one colour and one marker for each controller, in every picture."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -45,7 +45,7 @@ BOUND = {"color": "#000000", "linestyle": (0, (1, 1.5)), "linewidth": 1.4}
 
 @dataclass(frozen=True)
 class Style:
-    """How a controller is drawn.
+    """Plot style of a controller.
 
     Attributes:
         label: in legends.

@@ -1,4 +1,4 @@
-"""The leaderboard's plots: distributions, profiles, error by pressure, who beats whom."""
+"""The leaderboard's plots: distributions, profiles, error by pressure, pairwise comparison."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -25,7 +25,7 @@ THRESHOLDS = 120
 
 
 def distribution_plot(every: Sequence[Standings], styles: Styles) -> bytes:
-    """Where each controller's cases lie, and its interquartile mean with its interval."""
+    """Plot each controller's cases, and its interquartile mean with its interval."""
     most = max(len(standings.rows) for standings in every)
     with picture(11.0, 0.9 + len(every) * (0.75 + 0.27 * most)) as canvas:
         axes: Any = canvas.subplots(len(every), 1, squeeze=False)

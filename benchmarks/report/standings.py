@@ -1,4 +1,4 @@
-"""How controllers stand in a measure: means with their intervals, ranks, pairs."""
+"""Standings of controllers in a measure: means with intervals, ranks, pairs."""
 
 from dataclasses import dataclass
 from functools import cached_property

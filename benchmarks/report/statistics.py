@@ -1,4 +1,4 @@
-"""What many cases say together: robust means, and how sure they are.
+"""Statistics over many cases: robust means and their intervals.
 
 Errors come as an array: a row a controller, a column a case, so that everything is paired. How
 sure a figure is comes from resampling what was drawn at random, the stations (or, on one station,
@@ -98,7 +98,7 @@ class Draws:
 
     @property
     def counts(self) -> NDArray[np.int64]:
-        """How often each case was drawn, shape (replicates, cases)."""
+        """Count how often each case is drawn, shape (replicates, cases)."""
         rows, number = self.cases.shape
         at = self.cases + number * np.arange(rows)[:, None]
         return np.bincount(at.ravel(), minlength=rows * number).reshape(rows, number)

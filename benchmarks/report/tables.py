@@ -113,7 +113,7 @@ def spending_table(rows: Sequence[Spending], title: str, unit: str, labels: Labe
 def exercise_table(
     record: SuiteRecord, tasks: Sequence[str], names: Sequence[str], title: str, labels: Labels
 ) -> TextTable:
-    """What exercises came to beside their errors: medians over the cases that did not fail.
+    """Tabulate results of exercises beside their errors: medians over cases that did not fail.
 
     Args:
         record: the suite's rows.
@@ -156,7 +156,7 @@ def tasks_table(standings: Mapping[str, Standings], labels: Labels) -> TextTable
 def obstacle_table(
     obstacles: Mapping[tuple[str, float], str], every: Sequence[Standings]
 ) -> TextTable:
-    """What keeps the actuator from following, and what the bound and the best rival reach."""
+    """Tabulate why the actuator cannot follow, and what bound and best rival reach."""
     rows = []
     for (task, kpa), why in sorted(obstacles.items()):
         # On the way there a motor pulls; what it cannot do shows on the way back.
@@ -195,7 +195,7 @@ def verdict_table(checks: Sequence[Verdict]) -> TextTable:
 
 
 def failure_table(record: SuiteRecord, labels: Labels) -> TextTable:
-    """Why cases have no figures: each reason of a controller once."""
+    """Tabulate why cases have no figures: each reason of a controller once."""
     groups: dict[tuple[str, str], list[str]] = {}
     for name, episode, reason in record.failures():
         groups.setdefault((name, reason), []).append(episode.name)

@@ -1,4 +1,4 @@
-"""What tracking cost a controller: start and steady errors, effort, limits, computing time."""
+"""Costs of tracking: start and steady errors, effort, limits, computing time."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -53,7 +53,7 @@ class Spending(NamedTuple):
 
 
 def spending(record: SuiteRecord, measure: Measure, names: Sequence[str]) -> list[Spending]:
-    """What each of these controllers spent in a measure's tasks."""
+    """Return the costs of each controller in a measure's tasks."""
     return [_of_one(record, measure, name) for name in names]
 
 

@@ -1,4 +1,4 @@
-"""Whether a run meets what its suite asks for."""
+"""Verdicts on a run by its suite's targets."""
 
 from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple

@@ -31,7 +31,7 @@ def reading_blocks(model: str) -> list[Block]:
 
 
 def explained() -> str:
-    """What is known, what is assumed, and what would decide it: a sentence each."""
+    """State what is known, what is assumed and what would decide: a sentence each."""
     return (
         "Known: the replay turns further than the tables by nearly the same angle in all three "
         "phases, while the displacement trials of the same station fit, and neither a pulley of "

@@ -89,7 +89,7 @@ def summarise(errors: Sequence[ReplayError]) -> ReplaySummary:
 
 
 class TableAngle(NamedTuple):
-    """What table I3 says of a rotation trial's hold.
+    """Angle of a rotation trial's hold by table I3.
 
     Attributes:
         angle: mean angle (deg).

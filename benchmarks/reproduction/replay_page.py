@@ -57,7 +57,7 @@ def _origin(model: str) -> str:
 
 
 def displacement_verdict(results: Results, errors: Sequence[ReplayError]) -> str:
-    """Whether the model predicts the displacement trials better than the simple prediction."""
+    """State whether the model predicts displacement better than the simple prediction."""
     line = results.suite.goals.simple_prediction
     got = summarise(errors).absolute
     better = [_NAMES[name] for name in _NAMES if got[name] < line[name]]

@@ -40,7 +40,7 @@ ROTATION_TABLES = tuple(f"I{number}" for number in range(13, 21))
 
 
 class RotationReading(NamedTuple):
-    """How a potentiometer may have been read.
+    """Hypothetical decoding of a potentiometer.
 
     Attributes:
         decoded_deg_per_v: what its volts were multiplied by.
@@ -55,7 +55,7 @@ class RotationReading(NamedTuple):
     slack: float
 
     def of(self, angle: Array, radius: float) -> Array:
-        """What is read at true angles of the pulley (rad), as the plant turns it.
+        """Return the readings at true angles of the pulley (rad), as the plant turns it.
 
         Args:
             angle: true angle with the plant's slack (rad), any shape.

@@ -33,7 +33,7 @@ def parts_table(results: Results, task: str, phase: str) -> TextTable:
 
 
 def parts_explained() -> Paragraph:
-    """What the two parts are, and why both are shown."""
+    """Explain the two parts of the RMSE."""
     return Paragraph(
         "An RMSE against the ideal has two parts: the line part, the root mean square over the "
         "trial of its regression line less the ideal, and the scatter, the root mean square about "

@@ -1,4 +1,4 @@
-"""What the terminal shows at the end of a run."""
+"""Summary in the terminal at the end of a run."""
 
 from pathlib import Path
 
@@ -25,7 +25,7 @@ def print_summary(results: Results, report: Path, console: Console) -> None:
 
 
 def print_failures(results: Results, console: Console) -> None:
-    """Why cases failed, if any did: each reason once, with how many and the first of them."""
+    """Print why cases failed: each reason once, with the count and the first cases."""
     if not results.failures:
         return
     console.print(

@@ -22,7 +22,7 @@ Figures = Callable[[float], PhaseScore | None]
 
 
 def columns(results: Results, model: str, task: str, phase: str) -> dict[str, Figures]:
-    """Who stands in a table, measured first, and the figures of each by pressure."""
+    """Return the columns of a table, measured first: figures by pressure."""
     by_title: dict[str, Figures] = {MEASURED: lambda p: measured_score(task, phase, p)}
     for controller in results.suite.controllers:
         if not results.suite.does(controller, model):

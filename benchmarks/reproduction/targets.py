@@ -1,4 +1,4 @@
-"""What the job is measured by: each target beside the figure that this run got."""
+"""Targets of the job: each beside the figure of this run."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass

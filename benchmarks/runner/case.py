@@ -52,12 +52,12 @@ class Case:
 
     @property
     def name(self) -> str:
-        """What tells it from the suite's others: `pid/17/rotation/300/0`."""
+        """Unique name in the suite: `pid/17/rotation/300/0`."""
         return self.suite.case_name(self.episode, self.spec.name)
 
 
 def cases(suite: FrozenSuite, entries: tuple[Entry, ...]) -> list[Case]:
-    """What a suite's controllers have to do, episode by episode.
+    """List the cases of a suite's controllers, episode by episode.
 
     All controllers meet an episode before the next one begins, so that what is done when a run is
     interrupted compares them all. Tasks that a controller cannot do by its rule are left out.
@@ -71,7 +71,7 @@ def cases(suite: FrozenSuite, entries: tuple[Entry, ...]) -> list[Case]:
 
 
 def run_case(case: Case, model: Model | None = None) -> Row:
-    """Run a case; somebody's own controller in a process of its own.
+    """Run a case; a user's controller runs in a separate process.
 
     Args:
         case: the case.
@@ -98,7 +98,7 @@ def run_case(case: Case, model: Model | None = None) -> Row:
 
 
 def drive(case: Case, model: Model | None = None) -> tuple[Rollout, PMAEnv]:
-    """What happens in a case's episode, and the environment that it happened in.
+    """Run the episode of a case; return the rollout and its environment.
 
     Args:
         case: the case.

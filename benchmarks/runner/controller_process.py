@@ -31,7 +31,7 @@ class ControllerProcess:
         theirs.close()
 
     def ask(self, work: Callable[[], object], what: str, limit_s: float) -> object:
-        """What a call returns there, or the exception that it raises.
+        """Call a method in the process; return its result or raise its exception.
 
         Args:
             work: to be pickled.

@@ -1,4 +1,4 @@
-"""Who is scored: a controller of the registry, a class in somebody's own file, or a policy."""
+"""Controllers to score: of the registry, a class in a user's file, or a policy."""
 
 import difflib
 import inspect
@@ -44,19 +44,19 @@ class ControllerSpec:
 
     @property
     def source(self) -> str:
-        """What names it on the command line."""
+        """Name on the command line."""
         if self.is_policy:
             return f"{self.path}:{self.algorithm}" if self.algorithm else self.path
         return f"{self.path}:{self.name}" if self.path else self.name
 
     @property
     def is_policy(self) -> bool:
-        """Whether it is a policy from a file, or from a folder of them."""
+        """Whether it is a policy from a file or a folder of policies."""
         return bool(self.algorithm) or self.path.endswith(POLICY_FILES)
 
     @property
     def is_bound(self) -> bool:
-        """Whether it is the project's own bound, which alone is shown the environment."""
+        """Whether it is the project's bound, the only controller that receives the environment."""
         return not self.path and hasattr(CONTROLLERS.get(self.name), "receive")
 
     @property
@@ -201,7 +201,7 @@ def _class_of(spec: ControllerSpec) -> type:
 
 
 def raised_at(error: BaseException, path: Path) -> str:
-    """Where in somebody's file an exception came from: the last frame of that file, in words.
+    """Return where in a user's file an exception came from: its last frame, in words.
 
     Args:
         error: as it was caught.

@@ -1,4 +1,4 @@
-"""What a damaged file of results means: what it held is computed anew, and one line says so."""
+"""Damaged files of results: their contents are recomputed, with one warning."""
 
 import sys
 from functools import cache

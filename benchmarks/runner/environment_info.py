@@ -1,4 +1,4 @@
-"""What a result was made with, so that it can be made again: versions, commit, machine."""
+"""Environment of a result, to reproduce it: versions, commit, machine."""
 
 import os
 import platform

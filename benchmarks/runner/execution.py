@@ -19,7 +19,7 @@ Identity = tuple[str, Episode]
 
 @dataclass(frozen=True)
 class PendingCases:
-    """What is to be run, and what a journal has already.
+    """Cases to run, and rows that a journal already has.
 
     Attributes:
         suite: the suite.
@@ -42,17 +42,17 @@ class PendingCases:
 
 
 def identity(case: Case) -> Identity:
-    """What tells a case from its suite's others."""
+    """Return the identity of a case in its suite."""
     return case.spec.name, case.episode
 
 
 def row_identity(row: Row) -> Identity:
-    """What tells a row from the others of its suite and key."""
+    """Return the identity of a row in its suite and key."""
     return row["controller"], Episode(*(row[name] for name in Episode._fields))
 
 
 def pending_cases(suite: FrozenSuite, entries: Iterable[Entry], out: Path) -> PendingCases:
-    """What a folder's journal lacks of some controllers' cases.
+    """Return the cases of some controllers that a folder's journal lacks.
 
     A row counts only if its key is that of now. One whose process died counts as not run.
     """

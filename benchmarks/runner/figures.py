@@ -60,7 +60,7 @@ class PhaseFigures(NamedTuple):
 
 
 class Episode(NamedTuple):
-    """What happened in an episode, SI.
+    """Record of an episode, SI.
 
     Attributes:
         position: true position (m or rad) at k / 384 s, from 0 to the task's end.
@@ -160,7 +160,7 @@ def figures(task: Task, episode: Episode, period: float, limits: Any) -> Figures
 
 
 def violation(names: Sequence[str], truth: Mapping[str, ArrayLike], limits: Any) -> float:  # noqa: ANN401
-    """How far soft limits were passed, as a share of the way from the soft to the hard limit.
+    """Compute excess over soft limits as a share of the way from soft to hard limit.
 
     Args:
         names: limits to look at, keys of `REACH`.

@@ -1,4 +1,4 @@
-"""What a row was computed with: a row is used again only where all of it is the same."""
+"""Fingerprint of what a row was computed with: a row is reused only if it agrees."""
 
 import hashlib
 from collections.abc import Sequence

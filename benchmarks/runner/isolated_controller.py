@@ -1,4 +1,4 @@
-"""Somebody's own controller in a process of its own, where there is no environment.
+"""A user's controller in a separate process, which holds no environment.
 
 Within one process nothing can be hidden: `gc.get_objects()` and the frames that called a function
 lead to every object. So a class from a file runs in a process that receives the reference, the
@@ -21,7 +21,7 @@ from pma_gym.envs import Measurement, StationInfo
 
 
 def driver(spec: ControllerSpec, period: float, keep_pace: bool = True) -> Controller:
-    """What drives a case: of a class from a file an `Isolated`, of other files a `Guarded`.
+    """Return the driver of a case: `Isolated` for a class from a file, `Guarded` for other files.
 
     Args:
         spec: whose controller is made.

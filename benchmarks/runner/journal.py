@@ -226,7 +226,7 @@ def read_rows(path: Path) -> Iterator[Row]:
 
 
 def case_rows(path: Path) -> Iterator[Row]:
-    """As `read_rows`, those alone that are rows of cases, with figures or a reason for none."""
+    """Read rows as `read_rows` does, only those of cases, with figures or a failure."""
     damaged: list[str] = []
     for number, row in enumerate(read_rows(path), start=1):
         try:

@@ -1,4 +1,4 @@
-"""What a run was made with: written beside its scores, and read by those who show them."""
+"""Provenance of a run, stored beside its scores for reports."""
 
 import json
 import shlex
@@ -57,7 +57,7 @@ def check_folder(suite: FrozenSuite, out: Path) -> None:
 
 
 def read_run(out: Path) -> dict[str, Any]:
-    """What is known of the last run into a folder; empty if there is none, or a damaged one."""
+    """Read the provenance of a folder's last run; empty if missing or damaged."""
     path = out / RUN
     if not path.exists():
         return {}
@@ -101,7 +101,7 @@ def finished_rows(out: Path) -> list[Row]:
 
 
 def run_info(todo: PendingCases, entries: Sequence[Entry], out: Path, jobs: int) -> dict[str, Any]:
-    """What a run was made with: its resolved configuration, versions, commit and command."""
+    """Collect a run's provenance: resolved configuration, versions, commit, command."""
     suite = todo.suite
     return {
         "schema": SCHEMA,

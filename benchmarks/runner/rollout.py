@@ -1,4 +1,4 @@
-"""One case, run: a controller drives an environment, and what happened comes back."""
+"""Rollout of a case: a controller drives an environment for an episode."""
 
 import copy
 import math
@@ -27,7 +27,7 @@ _ROUNDING = 1e-9
 
 @dataclass(frozen=True)
 class Rollout:
-    """What happened in an episode that a controller drove, to its end or to a physical limit.
+    """Record of an episode under a controller, to its end or to a physical limit.
 
     Attributes:
         task: the task.
@@ -63,7 +63,7 @@ class Rollout:
 
     @cached_property
     def trial(self) -> Trial:
-        """It as a trial on the 384 Hz grid: the true position, commands in force, last readings."""
+        """The rollout as a trial at 384 Hz: true position, commands in force, last readings."""
         times = np.arange(self.position.size) / SAMPLE_RATE_HZ
         step = np.floor(times / self.period + _ROUNDING).astype(int)
         # The last grid point may fall on the end of the last step, where no further command came.

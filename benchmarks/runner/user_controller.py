@@ -1,4 +1,4 @@
-"""What stands between somebody's own controller and a run: time limits, errors in plain words."""
+"""Wrapper of a user's controller in a run: time limits, errors in plain words."""
 
 import time
 from collections import deque

@@ -1,4 +1,4 @@
-"""What one core can do at most: how fast it adds and multiplies, divides, takes roots.
+"""Peak rates of one core: additions and multiplications, divisions, roots.
 
 Measured with the same registers and the same compiler as the environments' kernel, on numbers that
 stay in registers and wait for nobody. Beside it stands how many of each an attempt at an internal

@@ -1,4 +1,4 @@
-"""What the workers' modules share: a prepared row, and the loops that step environments."""
+"""Prepared rows, and loops that step environments, for all workers."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field

@@ -32,7 +32,7 @@ OnDone = Callable[[str], None]
 
 
 class Asked(Protocol):
-    """What measures: a `client.Client`, or a test's stand-in."""
+    """Interface of what measures: a `client.Client`, or a test double."""
 
     versions: dict[str, str]
 
@@ -51,7 +51,7 @@ class Asked(Protocol):
 
 @dataclass(frozen=True)
 class Repetition:
-    """How long to measure.
+    """Durations and repetitions of a measurement.
 
     Attributes:
         rounds: number of rounds.
@@ -68,7 +68,7 @@ QUICK = Repetition(rounds=2, seconds=0.05)
 
 @dataclass
 class Measured:
-    """What was measured of a row.
+    """Measurement of a row.
 
     Attributes:
         row: the row.
@@ -142,7 +142,7 @@ class Measurement:
 
     @property
     def work(self) -> int:
-        """How often `on_done` is called, if no row is left out."""
+        """Number of calls of `on_done` if no row is left out."""
         return len(self.rows) * (1 + self.repetition.rounds)
 
     def run(self, on_done: OnDone = lambda title: None) -> None:

@@ -69,7 +69,7 @@ class Peer:
 
     @property
     def is_here(self) -> bool:
-        """Whether this interpreter has all that the worker needs."""
+        """Whether this interpreter has all packages of the worker."""
         if self.modules:
             return all(importlib.util.find_spec(name) for name in self.modules)
         return not self.installed

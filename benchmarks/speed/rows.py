@@ -1,4 +1,4 @@
-"""What is measured: one entry a row, which worker measures it and with which settings."""
+"""Rows to measure: each with its worker and settings."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
@@ -43,7 +43,7 @@ one pass (eps is Stable-Baselines3's own)."""
 
 
 class RequestError(ValueError):
-    """What was asked for cannot be done; the message says why and what could be."""
+    """A request that cannot be met; the message names reason and alternatives."""
 
 
 @dataclass(frozen=True)

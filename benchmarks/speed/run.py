@@ -91,7 +91,7 @@ def chosen_rows(targets: Sequence[Target], only: str) -> list[Row]:
 
 
 def partial_file(json_file: Path) -> Path:
-    """Where an interrupted run is written: beside the last whole run, never over it."""
+    """Return the file of an interrupted run: beside the last whole run, never over it."""
     return json_file.with_name(f"{json_file.stem}.partial.json")
 
 

@@ -1,4 +1,4 @@
-"""How long it takes from the start of Python to an environment's first step."""
+"""Time from the start of Python to an environment's first step."""
 
 import os
 import shutil

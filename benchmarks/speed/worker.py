@@ -76,7 +76,7 @@ def measured(row: Any, seconds: float) -> dict[str, Any]:  # noqa: ANN401 - a Pr
 
 
 def requests(lines: TextIO) -> Any:  # noqa: ANN401 - an iterator of what JSON holds
-    """What the lines of an input say."""
+    """Parse requests from lines of an input."""
     for line in lines:
         yield json.loads(line)
 

@@ -1,4 +1,4 @@
-"""Whether a drawn station can do the tasks at all: else it would say nothing about controllers."""
+"""Feasibility of tasks on a drawn station: infeasible ones do not compare controllers."""
 
 from functools import lru_cache
 
@@ -30,7 +30,7 @@ Ramp = tuple[dict[str, NDArray[np.float64]], float]
 
 
 def inability(model: Model, recipe: Recipe) -> str:
-    """Why a station cannot do a recipe's tasks, in words; empty if it can.
+    """Return why a station cannot do a recipe's tasks; empty if it can.
 
     It can if its drive lets go at 0 V, its muscle is damped, its regulator reaches every pressure,
     and a slow ramp of the actuator's voltage ends beyond every task's range, without breaking the

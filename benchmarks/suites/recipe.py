@@ -31,7 +31,7 @@ class Occasional(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Recipe:
-    """How stations are drawn about a nominal model.
+    """Recipe to draw stations around a nominal model.
 
     Attributes:
         model: name of the nominal model.

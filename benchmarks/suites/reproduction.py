@@ -1,4 +1,4 @@
-"""The suite of the dissertation's trials: several models, and goals of its own."""
+"""The suite of the dissertation's trials: several models, and its goals."""
 
 import hashlib
 from collections import Counter
@@ -72,7 +72,7 @@ class ReproductionSuite(FrozenSuite):
 
     @property
     def controllers(self) -> tuple[ControllerSpec, ...]:
-        """Who is compared, in the order of columns."""
+        """Compared controllers, in the order of columns."""
         return tuple(entry.spec for entry in self.entries)
 
     @property
@@ -86,14 +86,14 @@ class ReproductionSuite(FrozenSuite):
         return {task: plan.pressures_kpa for plan in self.episode_plans for task in plan.tasks}
 
     def does(self, controller: ControllerSpec, model: str) -> bool:
-        """Whether a controller runs on a model."""
+        """Return whether a controller runs on a model."""
         return any(
             entry.spec == controller and (not entry.models or model in entry.models)
             for entry in self.entries
         )
 
     def runs(self, entry: Entry, episode: Episode) -> bool:
-        """Whether a controller runs an episode: on its models, the tasks that it can do."""
+        """Return whether a controller runs an episode, by its models and tasks."""
         model = self.models[episode.station]
         return entry.does(episode.task) and (not entry.models or model in entry.models)
 
@@ -119,12 +119,12 @@ class ReproductionSuite(FrozenSuite):
         return int.from_bytes(digest[:4], "big")
 
     def case_name(self, episode: Episode, controller: str) -> str:
-        """What tells a case from the others, wherever its files lie: `station/pid/rotation/300`."""
+        """Return a case's unique name, wherever its files lie: `station/pid/rotation/300`."""
         model = Path(self.models[episode.station]).stem
         return f"{model}/{controller}/{episode.task}/{episode.pressure_kpa:g}"
 
     def is_pictured(self, episode: Episode) -> bool:
-        """Whether the report draws an episode's trials."""
+        """Return whether the report draws an episode's trials."""
         return episode.station == 0 and episode.pressure_kpa in self.pictured_kpa[episode.task]
 
     def on(self, models: Sequence[str]) -> "ReproductionSuite":

@@ -1,4 +1,4 @@
-"""What a frozen suite is: stations, episodes on them, the controllers that are compared."""
+"""Frozen suites: stations, episodes on them, compared controllers."""
 
 import hashlib
 from collections.abc import Mapping
@@ -27,7 +27,7 @@ NOMINAL = -1
 
 
 class Episode(NamedTuple):
-    """What happens on a station: a task at a pressure, with noise of its own.
+    """Episode on a station: a task at a pressure, with separate noise.
 
     Attributes:
         station: number of the station; `NOMINAL` for the one that is as its model.
@@ -43,7 +43,7 @@ class Episode(NamedTuple):
 
     @property
     def name(self) -> str:
-        """What tells it from the others: `17/rotation/300/0`."""
+        """Unique name: `17/rotation/300/0`."""
         return f"{self.station}/{self.task}/{self.pressure_kpa:g}/{self.repeat}"
 
 
@@ -88,7 +88,7 @@ class Entry(NamedTuple):
     models: tuple[str, ...] = ()
 
     def does(self, task: str) -> bool:
-        """Whether it can do a task."""
+        """Return whether it can do a task."""
         return not self.only or task in self.only
 
 
@@ -155,7 +155,7 @@ class FrozenSuite:
         return tuple(dict.fromkeys(task for plan in self.episode_plans for task in plan.tasks))
 
     def runs(self, entry: Entry, episode: Episode) -> bool:
-        """Whether a controller of the suite runs an episode."""
+        """Return whether a controller of the suite runs an episode."""
         return entry.does(episode.task)
 
     def seed_of(self, episode: Episode, controller: str = "") -> int:
@@ -180,11 +180,11 @@ class FrozenSuite:
         return self.nominal
 
     def case_name(self, episode: Episode, controller: str) -> str:
-        """What tells a case from the suite's others: `pid/17/rotation/300/0`."""
+        """Return a case's unique name: `pid/17/rotation/300/0`."""
         return f"{controller}/{episode.name}"
 
     def entry(self, spec: ControllerSpec) -> Entry:
-        """The suite's entry of a controller; one of its own for a controller it does not have.
+        """Return the suite's entry of a controller, or a new one for another controller.
 
         Raises:
             SuiteError: none of the suite's tasks is of a kind that the controller can do.

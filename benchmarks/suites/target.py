@@ -1,4 +1,4 @@
-"""What a suite asks of its controllers, as its file says."""
+"""Targets of a suite for its controllers, as in its file."""
 
 from collections.abc import Mapping
 from typing import Any, NamedTuple

@@ -127,7 +127,7 @@ def _numbered(folder: Path) -> list[Path]:
 
 
 def read_content(path: Path, keys: Collection[str]) -> dict[str, Any]:
-    """What a checkpoint remembers besides its tensors.
+    """Read the content of a checkpoint besides its tensors.
 
     Args:
         path: of the checkpoint.

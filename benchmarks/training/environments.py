@@ -21,7 +21,7 @@ RESERVE_KPA = 25
 
 
 def training_environments(preset: Preset, threads: int = 1) -> VecEnv:
-    """What a preset trains on."""
+    """Make the environments that a preset trains on."""
     drawn = Stations(preset.stations) if preset.stations else None
     return _made(preset, preset.environments, threads, drawn, staggered=True)
 

@@ -1,4 +1,4 @@
-"""One training, leg by leg: what a leg does depends on the checkpoint before it alone.
+"""One training, leg by leg: a leg depends only on the checkpoint before it.
 
 Every leg begins with fresh episodes and seeds of its own, made from the training's seed and the
 leg's number. So a training that was killed goes on from its last checkpoint to the same result.
@@ -72,7 +72,7 @@ class Point(NamedTuple):
 
 @dataclass(frozen=True)
 class Order:
-    """What is to be trained.
+    """Request for a training.
 
     Attributes:
         preset: with what.
@@ -100,7 +100,7 @@ class Order:
 
 @dataclass
 class Course:
-    """Where a training stands.
+    """Progress of a training.
 
     Attributes:
         curve: validations so far.

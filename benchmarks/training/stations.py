@@ -61,7 +61,7 @@ class Stations:
 
 
 def training_recipe(suite: str) -> Recipe:
-    """A suite's recipe with its training seed in place of its own.
+    """Return a suite's recipe with its training seed in place of the suite's seed.
 
     Raises:
         SuiteError: no such suite, or one that draws no stations.

@@ -1,4 +1,4 @@
-"""How well a policy follows on stations that it was not trained on."""
+"""Validation error of a policy on stations that it was not trained on."""
 
 from typing import Any, NamedTuple
 

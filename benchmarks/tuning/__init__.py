@@ -1,1 +1,1 @@
-"""How gains are found: rows of the table, the linearised loop, what a trial costs."""
+"""Tuning of gains: rows of the table, linearised loop, cost of a trial."""

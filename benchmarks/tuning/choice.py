@@ -1,4 +1,4 @@
-"""Which of several named tables a command was asked for."""
+"""Choice of named tables on the command line."""
 
 import difflib
 import fnmatch

@@ -1,4 +1,4 @@
-"""What gains cost: whole trials with sensor noise on several stations, and the loop's margin."""
+"""Cost of gains: whole trials with sensor noise on several stations, and the loop's margin."""
 
 import math
 from dataclasses import replace
@@ -36,7 +36,7 @@ STATIONS = ((1.0, 1.0), (1.0, 1.0), (1.2, 0.8), (0.8, 1.2))
 
 
 class Cost:
-    """What gains cost; see `benchmarks.tuning.tune`."""
+    """Cost of gains; see `benchmarks.tuning.tune`."""
 
     def __init__(self, job: Job) -> None:
         self.job = job

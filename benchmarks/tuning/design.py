@@ -91,7 +91,7 @@ class DesignProblem:
 
     @property
     def name(self) -> str:
-        """What tells it from the others."""
+        """Unique name."""
         return f"{self.controller}/{self.table}"
 
     @property
@@ -276,7 +276,7 @@ def mean_cost(factory: Any, settings: Any, drills: list[_Drill], suite: str) -> 
 
 
 def trial_cost(done: Rollout) -> float:
-    """What a trial costs; `FAILED` if a physical limit ended it."""
+    """Return the cost of a trial; `FAILED` if a physical limit ended it."""
     if done.ended_by:
         return FAILED
     schedule = done.task.schedule

@@ -69,5 +69,5 @@ class KeptRows:
 
 
 def name_of(row: Job) -> str:
-    """What tells a row from the others: `100hz/rotation/pid/350`."""
+    """Return a row's unique name: `100hz/rotation/pid/350`."""
     return f"{row.loop}/{row.task}/{row.controller}/{row.pressure_kpa:g}"

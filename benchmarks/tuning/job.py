@@ -38,7 +38,7 @@ class Job:
 
     @property
     def station(self) -> StationInfo:
-        """What a controller of the row receives."""
+        """The station info that a controller of the row receives."""
         task, pressure = EVERY_TASK[self.task], self.pressure_kpa * 1e3
         return StationInfo(self.model, task, pressure, 1.0 / self.rate_hz, self.delay_s)
 

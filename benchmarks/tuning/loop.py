@@ -43,7 +43,7 @@ class Loop:
 
 
 def lambda_tuning(job: Job) -> np.ndarray:
-    """k_p, k_i, k_d (SI), end factor and, for the PID alone, lead (s) to start from."""
+    """Return starting values: k_p, k_i, k_d (SI), end factor and, for the PID, lead (s)."""
     station = job.station
     (place, *_) = linearised(station, [0.5])
     one = place.system[job.schedule.quantity, f"{station.task.actuator}_voltage"]

@@ -32,7 +32,7 @@ def misprints() -> str:
 
 
 def verdicts() -> str:
-    """How many figures of each study are equal, rounded and wrong in print."""
+    """Tabulate figures of each study that are equal, rounded and misprinted."""
     rows = []
     for study in dict.fromkeys(row.study for row in _compared()):
         counts = Counter(row.verdict for row in _compared() if row.study == study)

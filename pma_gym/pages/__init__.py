@@ -1,1 +1,1 @@
-"""Pages that a reader opens: words, tables and plots as Markdown or as one file of HTML."""
+"""Report pages: text, tables and plots as Markdown or as a single HTML file."""

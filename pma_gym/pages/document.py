@@ -1,4 +1,4 @@
-"""A report as a list of blocks, and the same blocks as Markdown and as one page of HTML."""
+"""Blocks of a report, and their rendering as Markdown and as one HTML page."""
 
 import base64
 import html
@@ -63,7 +63,7 @@ class Picture:
 
 @dataclass(frozen=True)
 class Callout:
-    """What the reader must not miss, in a box.
+    """Important text in a box.
 
     Attributes:
         text: large.
@@ -78,14 +78,14 @@ class Callout:
 
 @dataclass(frozen=True)
 class Formula:
-    """Lines that keep their layout: equations, commands, a part of a file."""
+    """Preformatted lines: equations, commands, a part of a file."""
 
     text: str
 
 
 @dataclass(frozen=True)
 class Steps:
-    """A numbered list; marked up as a paragraph is."""
+    """A numbered list, with the markup of a paragraph."""
 
     items: Sequence[str]
 
@@ -106,7 +106,7 @@ _PANELS_FROM = 800
 
 
 def to_markdown(blocks: Sequence[Block], pictures: Mapping[str, bytes], folder: str) -> str:
-    """The blocks as Markdown; pictures are linked, in a folder beside the file.
+    """Render blocks as Markdown that links pictures in a folder beside the file.
 
     Args:
         blocks: the report.
@@ -139,7 +139,7 @@ def to_markdown(blocks: Sequence[Block], pictures: Mapping[str, bytes], folder: 
 
 
 def to_html(blocks: Sequence[Block], pictures: Mapping[str, bytes]) -> str:
-    """The blocks as one page that needs nothing else: pictures, figures and style are inside.
+    """Render blocks as one self-contained HTML page with pictures, figures and style.
 
     Args:
         blocks: the report; the first is its heading.
@@ -180,7 +180,7 @@ def _without_tags(text: str) -> str:
 
 
 def html_block(block: Block, pictures: Mapping[str, bytes]) -> str:
-    """A block as HTML.
+    """Render a block as HTML.
 
     Args:
         block: the block.

@@ -1,4 +1,4 @@
-"""How plots look, wherever they are drawn: one style, no screen, the same bytes every time."""
+"""Style of all plots: drawn without a screen, the same bytes every time."""
 
 import io
 import warnings
@@ -41,7 +41,7 @@ class Plot(Figure):
     """
 
     def _repr_png_(self) -> bytes:
-        """What a notebook shows."""
+        """Return the PNG that a notebook shows."""
         return png(self)
 
     def show(self, warn: bool = True) -> None:
@@ -67,7 +67,7 @@ class Plot(Figure):
 
 @contextmanager
 def picture(width: float, height: float) -> Iterator[Plot]:
-    """An empty figure (inches) in the house style; drawn without a screen."""
+    """Create an empty figure (inches) in the project's style, without a screen."""
     with mpl.rc_context(_RULES):
         figure = Plot(figsize=(width, height), layout="constrained")
         FigureCanvasAgg(figure)
@@ -75,14 +75,14 @@ def picture(width: float, height: float) -> Iterator[Plot]:
 
 
 def png(figure: Figure) -> bytes:
-    """The figure as PNG; the same figure gives the same bytes."""
+    """Render the figure as PNG; the same figure gives the same bytes."""
     out = io.BytesIO()
     figure.savefig(out, format="png", dpi=DPI, metadata={"Software": None})
     return out.getvalue()
 
 
 def legend_below(figure: Figure, handles: Sequence[object], columns: int) -> None:
-    """One legend for all panels, under them; in fewer columns where the figure is too narrow.
+    """Draw one legend under all panels, in fewer columns where the figure is too narrow.
 
     Args:
         figure: drawn by Agg.

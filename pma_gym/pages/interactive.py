@@ -1,4 +1,4 @@
-"""Figures to zoom, hover and filter, drawn by the reader's browser without a network.
+"""Interactive figures (zoom, hover, filter), drawn by the browser without a network.
 
 `plotly-basic.min.js` is plotly.js 4.1.1 (basic bundle, MIT licence beside it), from npm's package
 `plotly.js-basic-dist-min`; a page holds it once, however many figures it has.
@@ -23,7 +23,7 @@ class Trace:
     """A curve or a cloud of points.
 
     Attributes:
-        name: in the legend, where a click hides it and a double click shows it alone.
+        name: in the legend, where a click hides it and a double click hides all others.
         x: of the points.
         y: of the points; NaN leaves a gap.
         color: `#rrggbb`; empty for the colour of text.
@@ -44,7 +44,7 @@ class Trace:
 
 @dataclass(frozen=True)
 class InteractiveFigure:
-    """A figure that only the HTML page has; print and Markdown have pictures.
+    """A figure of the HTML page only; print and Markdown have pictures.
 
     Traces with different views make the figure one with a menu: the reader picks what it shows.
 
@@ -66,7 +66,7 @@ class InteractiveFigure:
 
 
 def scripts(figures: Sequence[InteractiveFigure]) -> str:
-    """What stands in a page's head: the library, the figures as data, and the few lines that draw.
+    """Return the scripts of a page's head: library, figures as data, drawing code.
 
     Empty where there are none.
     """

@@ -1,4 +1,4 @@
-"""Objects as notebooks show them: blocks of a report as a piece of HTML, styled within itself."""
+"""HTML for notebooks: blocks of a report as a fragment with its own style."""
 
 from collections.abc import Mapping, Sequence
 
@@ -21,7 +21,7 @@ _STYLE = """<style>
 
 
 def notebook_html(blocks: Sequence[Block], pictures: Mapping[str, bytes] | None = None) -> str:
-    """The blocks as HTML for a notebook's output: what `_repr_html_` returns.
+    """Render blocks as the HTML that `_repr_html_` returns.
 
     Args:
         blocks: what is shown.

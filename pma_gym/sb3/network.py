@@ -1,13 +1,13 @@
-"""Networks of Linear layers with tanh between them, with less arithmetic on a processor.
+"""Linear layers with tanh between them, computed with less arithmetic on a processor.
 
-A hidden layer's tanh is computed from the logistic function s, for PyTorch's tanh costs three times
-as much, and what is linear is left to the products of matrices:
+PyTorch's tanh costs three times as much as the logistic function s. So a hidden layer's tanh is
+computed from s, and the products of matrices take the linear part:
 
     h_k = tanh(W_k h_(k-1) + b_k) = 2 s_k - 1
     s_1 = s(2 (W_1 x + b_1))
     s_k = s(4 W_k s_(k-1) + 2 (b_k - W_k 1))        y = 2 W_n s_(n-1) + b_n - W_n 1
 
-so that h is nowhere computed. Its derivative 1 - h^2 is 4 s (1 - s).
+h itself is never computed. Its derivative 1 - h^2 is 4 s (1 - s).
 
 Networks of the same observations whose layers have the same shapes, such as actor and critic, are
 computed side by side: half the calls of PyTorch, and of two threads each has a network.
@@ -33,7 +33,7 @@ depends on when they are multiplied in."""
 
 
 def is_plain(modules: Sequence[nn.Module]) -> bool:
-    """Whether they are Linear, Tanh and so on up to a Linear, with one hidden layer or more."""
+    """Return whether modules alternate Linear and Tanh, end in Linear, and have a hidden layer."""
     linear, between = modules[::2], modules[1::2]
     return (
         len(linear) == len(between) + 1 > 1
@@ -43,19 +43,19 @@ def is_plain(modules: Sequence[nn.Module]) -> bool:
 
 
 def layers_of(modules: Sequence[nn.Module]) -> Layers:
-    """Weights and biases of modules that are plain."""
+    """Return weights and biases of modules for which `is_plain` is true."""
     linear: Any = modules[::2]
     return [(one.weight, one.bias) for one in linear]
 
 
 def alike(nets: Sequence[Layers]) -> Sequence[Sequence[Layers]]:
-    """Networks in groups that can be side by side: all of them, or each alone."""
+    """Group networks that can be stacked: one group if all shapes agree, else one each."""
     shapes = {tuple(weight.shape for weight, _ in layers) for layers in nets}
     return [nets] if len(shapes) == 1 else [[layers] for layers in nets]
 
 
 def side_by_side(nets: Sequence[Layers]) -> Layers:
-    """A copy of networks that are alike; one is left as it is."""
+    """Stack networks of equal shapes into new tensors; return a single network unchanged."""
     if len(nets) == 1:
         return nets[0]
     return [
@@ -65,7 +65,7 @@ def side_by_side(nets: Sequence[Layers]) -> Layers:
 
 
 def scaled(layers: Layers) -> Sequence[Layer]:
-    """The layers as `passed` wants them, those of s in place of h.
+    """Rewrite layers for `passed`: with products of s in place of h.
 
     Args:
         layers: two or more.
@@ -82,7 +82,7 @@ def scaled(layers: Layers) -> Sequence[Layer]:
 
 
 def passed(x: Tensor, layers: Sequence[Layer], out: Sequence[Tensor] = ()) -> list[Tensor]:
-    """What every hidden layer passes on, its s, and y; shapes (rows, outputs).
+    """Compute the output s of every hidden layer, and y; shapes (rows, outputs).
 
     Args:
         x: the same for all networks, shape (rows, inputs).
@@ -106,12 +106,12 @@ def _linear(x: Tensor, layer: Layer, out: Tensor | None = None) -> Tensor:
 
 
 def _added(factor: Tensor) -> Callable[..., Tensor]:
-    """What adds a product to something."""
+    """Return the function that adds a matrix product to a tensor."""
     return torch.addmm if factor.dim() == 2 else torch.baddbmm
 
 
 def network(x: Tensor, layers: Layers) -> Tensor:
-    """What a network says, with derivatives from one node of PyTorch's graph.
+    """Evaluate a network, as one node of PyTorch's graph.
 
     Args:
         x: shape (rows, inputs).
@@ -131,16 +131,16 @@ def derivatives(
     hidden: Sequence[Tensor],
     out: "Derivatives",
 ) -> Tensor:
-    """Of a sum: from its derivatives by y those by weights and biases, which are written to `out`.
+    """Backpropagate derivatives by y to weights and biases, and write these to `out`.
 
     Args:
         grad_output: shape (rows, outputs).
         x: the same for all networks, shape (rows, inputs).
         weights: of the layers.
-        hidden: what they passed on.
+        hidden: outputs s of the hidden layers.
         out: where to write.
     Returns:
-        Those by the first layer's output before its tanh; shape (rows, outputs).
+        Derivatives by the first layer's output before its tanh; shape (rows, outputs).
     """
     back = zip(weights[:0:-1], hidden[::-1], out.layers[:0:-1], out.hidden[::-1], strict=True)
     for weight, s, (of_weight, of_bias), place in back:
@@ -163,11 +163,11 @@ def derivatives(
 
 
 class Derivatives:
-    """Where derivatives are written.
+    """Memory that derivatives are written to.
 
     Args:
-        layers: those by weights and biases, shaped as they are.
-        hidden: memory for those by what hidden layers pass on, shapes (rows, outputs).
+        layers: derivatives by weights and biases, of their shapes.
+        hidden: derivatives by the outputs of hidden layers, shapes (rows, outputs).
     """
 
     def __init__(self, layers: Layers, hidden: Sequence[Tensor]) -> None:

@@ -24,10 +24,9 @@ class LeanMlpPolicy(ActorCriticPolicy):
     other, and policy files are exported from it as from `MlpPolicy`. Actions are drawn with the
     same random numbers.
 
-    What it leaves to `ActorCriticPolicy`, at that one's speed: networks that are anything but
-    Linear layers with Tanh between them, actions that are not Gaussian, gSDE, autocast, what
-    `torch.compile` compiles, and devices other than the processor. Derivatives are first ones only,
-    and are not traced.
+    `ActorCriticPolicy` computes, at its own speed, networks other than Linear layers with Tanh
+    between them, actions that are not Gaussian, gSDE, autocast, code under `torch.compile`, and
+    devices other than the processor. Only first derivatives are available, and they are not traced.
 
     Example:
         >>> from stable_baselines3 import PPO
@@ -40,7 +39,7 @@ class LeanMlpPolicy(ActorCriticPolicy):
     _held: "_Held | None" = None
 
     def forward(self, obs: Tensor, deterministic: bool = False) -> tuple[Tensor, Tensor, Tensor]:
-        """Actions, values and logarithms of the actions' likelihoods; see `ActorCriticPolicy`."""
+        """Return actions, values and log-likelihoods of the actions; see `ActorCriticPolicy`."""
         held = self._held
         if held is not None and not deterministic and held.is_current():
             return held.drawn(obs)
@@ -56,7 +55,7 @@ class LeanMlpPolicy(ActorCriticPolicy):
         obs: Any,  # noqa: ANN401 - as the base class has it
         actions: Tensor,
     ) -> tuple[Tensor, Tensor, Tensor | None]:
-        """Values, logarithms of the actions' likelihoods, and entropies; see the base class."""
+        """Return values, log-likelihoods of the actions, and entropies; see the base class."""
         if not self.is_lean():
             return super().evaluate_actions(obs, actions)
         mean, values = self._mean_and_values(obs)
@@ -64,7 +63,7 @@ class LeanMlpPolicy(ActorCriticPolicy):
         return values, self._log_likelihood(actions, mean), entropy
 
     def is_lean(self) -> bool:
-        """Whether it computes anything itself, or leaves all to `ActorCriticPolicy`."""
+        """Return whether the lean computation applies; else `ActorCriticPolicy` computes."""
         return (
             type(self.action_dist) is DiagGaussianDistribution
             and type(self.mlp_extractor) is MlpExtractor
@@ -76,11 +75,11 @@ class LeanMlpPolicy(ActorCriticPolicy):
 
     @contextmanager
     def held(self) -> Iterator[None]:
-        """Draw actions faster, without gradients, while parameters stay as they are.
+        """Draw actions faster, without gradients, while parameters stay unchanged.
 
-        What follows from them is computed once. It is for flat observations that need no
-        extracting; where parameters change all the same, actions are drawn as ever. (Not noticed
-        is what is written to a parameter's `data`.)
+        Quantities that depend only on parameters are computed once. Observations must be flat, with
+        no feature extractor. If parameters change, actions are drawn in the usual way. (A write to
+        a parameter's `data` is not detected.)
         """
         self._held = _Held(self)
         try:
@@ -89,12 +88,12 @@ class LeanMlpPolicy(ActorCriticPolicy):
             self._held = None
 
     def networks(self) -> tuple[list[nn.Module], list[nn.Module]]:
-        """Modules of actor and critic, in order."""
+        """Return the modules of actor and critic, in order."""
         nets = self.mlp_extractor
         return [*nets.policy_net, self.action_net], [*nets.value_net, self.value_net]
 
     def layers(self) -> list[Layers]:
-        """Weights and biases of actor and critic."""
+        """Return weights and biases of actor and critic."""
         return [layers_of(modules) for modules in self.networks()]
 
     def _mean_and_values(self, obs: Any) -> tuple[Tensor, Tensor]:  # noqa: ANN401
@@ -106,23 +105,23 @@ class LeanMlpPolicy(ActorCriticPolicy):
         return mean, network(of_critic, critic)
 
     def check_mean(self, mean: Tensor) -> None:
-        """Refuse means or deviations that are no numbers, as `ActorCriticPolicy` does.
+        """Refuse NaN in means or deviations, as `ActorCriticPolicy` does.
 
         Raises:
-            ValueError: says which and what they are.
+            ValueError: NaN; the message names the parameter and its values.
         """
         if (mean + self.log_std).isnan().any():
             self.action_dist.proba_distribution(mean, self.log_std)
 
     def _log_likelihood(self, actions: Tensor, mean: Tensor) -> Tensor:
-        """Of the normal distribution, summed over an action's entries; shape (rows,)."""
+        """Log-likelihood of a normal distribution, summed over entries; shape (rows,)."""
         deviations = (actions - mean) * (-self.log_std).exp()
         constant = (self.log_std + HALF_LOG_TAU).sum()
         return -0.5 * deviations.square().sum(dim=1) - constant
 
 
 class _Held:
-    """What a policy draws actions with, while its parameters are what they were."""
+    """Precomputed layers that draw actions while the policy's parameters are unchanged."""
 
     def __init__(self, policy: LeanMlpPolicy) -> None:
         self._parameters = list(policy.parameters())
@@ -134,12 +133,12 @@ class _Held:
             self._constant = (policy.log_std + HALF_LOG_TAU).sum()
 
     def is_current(self) -> bool:
-        """Whether the parameters are what they were, and no gradients are wanted."""
+        """Return whether the parameters are unchanged and gradients are off."""
         versions = [one._version for one in self._parameters]
         return versions == self._versions and not torch.is_grad_enabled()
 
     def drawn(self, obs: Tensor) -> tuple[Tensor, Tensor, Tensor]:
-        """As the policy's `forward`."""
+        """Return what the policy's `forward` returns."""
         seen = obs.float()
         mean = passed(seen, self._actor)[-1]
         self._policy.check_mean(mean)

@@ -151,7 +151,7 @@ class LeanPPO(PPO):
         clip_values: float | None,
         losses: "_Losses",
     ) -> Sequence[Numbers]:
-        """Those of the losses by what actor and critic say, shapes (rows, outputs)."""
+        """Return derivatives of the losses by the outputs of actor and critic, (rows, outputs)."""
         mean, values = updates.passed(part.observations)
         updates.policy.check_mean(mean)
         by_mean = self._act(updates, part, mean.numpy(), clip, losses)
@@ -166,7 +166,7 @@ class LeanPPO(PPO):
     def _act(
         self, updates: "_Updates", part: "_Part", mean: Numbers, clip: float, losses: "_Losses"
     ) -> Numbers:
-        """Derivatives of the actor's loss by the means; those by `log_std` are written."""
+        """Return derivatives of the actor's loss by the means; write those by `log_std`."""
         log_std = updates.log_std
         deviations = (part.actions - mean) * np.exp(-log_std)
         squares = np.square(deviations)
@@ -187,7 +187,7 @@ class LeanPPO(PPO):
     def _criticise(
         self, part: "_Part", values: Numbers, clip: float | None, losses: "_Losses"
     ) -> Numbers:
-        """Derivatives of the critic's loss by the values; shape (rows, 1)."""
+        """Return derivatives of the critic's loss by the values; shape (rows, 1)."""
         errors = by_value = values - part.returns
         if clip is not None:
             changes = values - part.values
@@ -234,11 +234,11 @@ class _Part:
 
 
 class _Rollout:
-    """What a buffer holds, a row a step, all of a step side by side.
+    """Contents of a buffer as a table with a row for each step.
 
     Args:
         buffer: the buffer.
-        normalises: advantages of a minibatch get a mean of 0 and a standard deviation of 1.
+        normalises: whether advantages of a minibatch get mean 0 and standard deviation 1.
     """
 
     def __init__(self, buffer: RolloutBuffer, normalises: bool) -> None:
@@ -261,10 +261,10 @@ class _Rollout:
 
 
 class _Group:
-    """Networks side by side, with memory for a minibatch's pass and derivatives.
+    """Stacked networks with memory for a minibatch's forward pass and derivatives.
 
     Args:
-        nets: they are alike.
+        nets: networks of equal shapes.
     """
 
     def __init__(self, nets: Sequence[Layers]) -> None:
@@ -275,11 +275,11 @@ class _Group:
         self._gradients: Layers = []
 
     def shapes(self) -> list[torch.Size]:
-        """Of weights and biases, layer after layer."""
+        """Return shapes of weights and biases, layer after layer."""
         return [shape for one in self._weights for shape in (one.shape, one.shape[:-1])]
 
     def take(self, gradients: Sequence[Tensor]) -> None:
-        """Write derivatives there from now on, of the `shapes`; they are the parameters' own."""
+        """Write derivatives into these tensors (of `shapes`); parameters get them as `grad`."""
         self._gradients = list(zip(gradients[::2], gradients[1::2], strict=True))
         parameters = [chain.from_iterable(layers) for layers in self._nets]
         for of_nets, pieces in zip(zip(*parameters, strict=True), gradients, strict=True):
@@ -287,7 +287,7 @@ class _Group:
                 parameter.grad = piece
 
     def follow(self) -> None:
-        """What follows from the parameters, once they have changed."""
+        """Update stacked and scaled layers after the parameters have changed."""
         layers = side_by_side(self._nets)
         self._weights = [weight for weight, _ in layers]
         self._scaled = scaled(layers)
@@ -305,7 +305,7 @@ class _Group:
         return [together] if self.count == 1 else list(together)
 
     def _buffers(self, rows: int) -> list[list[Tensor]]:
-        """Memory for what hidden layers pass on, and for derivatives by it."""
+        """Return memory for outputs of hidden layers, and for derivatives by them."""
         if rows not in self._memory:
             hidden = [weight[..., 0] for weight in self._weights[:-1]]
             shapes = [(*one.shape[:-1], rows, one.shape[-1]) for one in hidden]
@@ -334,20 +334,20 @@ class _Updates:
 
     @property
     def are_together(self) -> bool:
-        """Whether actor and critic are in one group."""
+        """Whether actor and critic form one group."""
         return len(self._groups) == 1
 
     def passed(self, seen: Tensor) -> list[Tensor]:
-        """What actor and critic say; shapes (rows, outputs)."""
+        """Return the outputs of actor and critic; shapes (rows, outputs)."""
         return [y for group in self._groups for y in group.passed(seen)]
 
     def make(self, grad_output: Sequence[Numbers], seen: Tensor, most: float) -> None:
-        """An update, by derivatives whose norm is limited.
+        """Update the parameters by derivatives whose norm is limited.
 
         Args:
-            grad_output: the loss's derivatives by what actor and critic said.
-            seen: what they said it of.
-            most: of the norm.
+            grad_output: derivatives of the losses by the outputs of actor and critic.
+            seen: the observations of these outputs.
+            most: limit of the norm.
         """
         left = [torch.from_numpy(one) for one in grad_output]
         for group in self._groups:
@@ -360,7 +360,7 @@ class _Updates:
 
 
 class _Losses:
-    """Of minibatches."""
+    """Losses and statistics of minibatches."""
 
     def __init__(self) -> None:
         self.policies: list[float] = []

@@ -1,4 +1,4 @@
-"""One thread for work that is done over and over, or two, whichever is faster lately."""
+"""Choice between one and two threads for repeated work, by recent times."""
 
 import math
 import time
@@ -8,10 +8,10 @@ from contextlib import contextmanager
 import torch
 
 FIRST = 3
-"""Times that one thread alone does the work at first, to know what it takes."""
+"""Repetitions that a single thread does first, to measure its time."""
 
 PATIENCE = 2.0
-"""What two threads may lose against one before they are given up: in times of one thread."""
+"""Loss of two threads against one from which they pause: in times of one thread."""
 
 PAUSES_S = (0.5, 8.0)
 """The shortest and the longest pause until two threads are tried again."""
@@ -19,7 +19,7 @@ PAUSES_S = (0.5, 8.0)
 
 @contextmanager
 def threads(count: int) -> Iterator[None]:
-    """PyTorch has so many threads meanwhile."""
+    """Set the number of PyTorch's threads inside the context."""
     before = torch.get_num_threads()
     torch.set_num_threads(count)
     try:
@@ -29,13 +29,13 @@ def threads(count: int) -> Iterator[None]:
 
 
 class ThreadTuner:
-    """Chooses by how long the work has taken.
+    """Chooses the number of threads by the time that the work has taken.
 
     PyTorch's threads wait for each other many times in a minibatch. Where another program wants a
-    core too, they often wait for a whole turn of that one's: of two trainings at once on two cores
-    (Xeon), with two threads each, each took 5 times as long as alone with minibatches of 4096, and
-    more than 50 times with 1024. So two threads are given up as soon as they have lost more than
-    `PATIENCE`, and tried again after a pause, which doubles while they go on losing.
+    core too, they often wait for its whole time slice: of two trainings at once on two cores
+    (Xeon), with two threads each, each took 5 times as long as a single training with minibatches
+    of 4096, and more than 50 times with 1024. So two threads stop as soon as they have lost more
+    than `PATIENCE`, and start again after a pause, which doubles while they go on losing.
 
     It is for work whose result does not depend on the number of threads.
     """
@@ -48,7 +48,7 @@ class ThreadTuner:
 
     @contextmanager
     def work(self, amount: float) -> Iterator[None]:
-        """Do so much work meanwhile, in any unit, with the threads that it takes."""
+        """Time an amount of work (any unit) inside the context, with the chosen threads."""
         start = time.perf_counter()
         count = 2 if len(self._alone) >= FIRST and start >= self._until else 1
         with threads(count):

@@ -22,7 +22,7 @@ from pma_gym.tasks import Task
 
 
 class EngineVecEnv(VecEnv):
-    """What VecEnvs around a `PMAVectorEnv` share: their environments have one engine.
+    """Base of VecEnvs around a `PMAVectorEnv`, whose environments share one engine.
 
     Attributes:
         envs: the PMAVectorEnv.
@@ -43,7 +43,7 @@ class EngineVecEnv(VecEnv):
         return [self.envs.member(int(i)) for i in numbers]  # type: ignore[union-attr]
 
     def get_attr(self, attr_name: str, indices: VecEnvIndices = None) -> list[Any]:
-        """An attribute of each environment, as `PMAEnv` has it."""
+        """Return an attribute of each environment, as `PMAEnv` has it."""
         return [self._read(member, attr_name) for member in self._members(indices)]
 
     def _read(self, member: BatchMember, name: str) -> Any:  # noqa: ANN401 - an attribute
@@ -63,7 +63,7 @@ class EngineVecEnv(VecEnv):
         value: Any,  # noqa: ANN401 - as the base class has it
         indices: VecEnvIndices = None,
     ) -> None:
-        """Refused: environments that share an engine have no attributes of their own.
+        """Refuse: environments that share an engine have no separate attributes.
 
         Raises:
             AttributeError: always; says what can be done instead.
@@ -91,16 +91,16 @@ class EngineVecEnv(VecEnv):
         return [method(*method_args, **method_kwargs) for method in methods]
 
     def env_is_wrapped(self, wrapper_class: type, indices: VecEnvIndices = None) -> list[bool]:
-        """True for Monitor, whose `episode` the infos hold; no other wrapper is in a batch."""
+        """Return True for Monitor, whose `episode` the infos hold, and False for other wrappers."""
         return [wrapper_class is Monitor for _ in self._members(indices)]
 
     def get_images(self) -> Sequence[np.ndarray | None]:
-        """A picture of each environment, or None for each without a render mode."""
+        """Return a picture of each environment, or None without a render mode."""
         return self.envs.render() or [None] * self.num_envs
 
 
 class SB3VecEnv(EngineVecEnv):
-    """`PMAVectorEnv` as a VecEnv: what Stable-Baselines3 trains on.
+    """`PMAVectorEnv` as a VecEnv, for training with Stable-Baselines3.
 
     An environment's info is empty but where its episode ends. There it has `PMAEnv`'s last info,
     `terminal_observation`, `TimeLimit.truncated`, and `episode` as Monitor writes it (return r,
@@ -145,7 +145,7 @@ class SB3VecEnv(EngineVecEnv):
         self._made = time.time()
 
     def reset(self) -> VecEnvObs:
-        """Begin an episode in every environment, with what `seed` and `set_options` were given."""
+        """Begin an episode in every environment, with the values of `seed` and `set_options`."""
         options = {"pressures_kpa": self._pressures()} if any(self._options) else None
         observations, _ = self.envs.reset(seed=self._seeds, options=options)
         self._returns[:], self._lengths[:] = 0.0, 0

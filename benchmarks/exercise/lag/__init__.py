@@ -1,1 +1,1 @@
-"""What the regulator's lag makes impossible in an exercise: three bounds."""
+"""Three bounds on the error of an exercise that the regulator's lag sets."""

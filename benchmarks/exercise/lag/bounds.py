@@ -1,4 +1,4 @@
-"""What the regulator's lag makes impossible in an exercise, as bounds of three kinds.
+"""Bounds of three kinds on the error of an exercise that the regulator's lag sets.
 
     foreknown   best RMSE of somebody who knows the operator's course: with the lag as it is, with
                 twice of it and with hardly any (`benchmarks.exercise.lag.foreknown`)
@@ -114,7 +114,7 @@ def foreknown_bounds(
     model: Model,
     operator: str | Operator = "random",
 ) -> Iterator[Foreknown]:
-    """What is left to who knows the operator's course, operator by operator; as `lag_bounds`."""
+    """Compute the bounds with the operator's course known, per operator; see `lag_bounds`."""
     for seed in seeds:
         for pressure in pressures_kpa:
             exertion = Exertion(task, seed, model, pressure, operator)

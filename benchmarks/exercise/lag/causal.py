@@ -1,4 +1,4 @@
-"""What a regulator's lag costs whoever must react: least variance against an unsteady operator.
+"""Least variance of causal control against an unsteady operator, with the regulator's lag.
 
 The joint stands near a point of the exercise, by the nominal plant's linear laws at 100 Hz. The
 operator's moment is unsteady as `pma_gym.tasks.operator` says, his joint has its stiffness:

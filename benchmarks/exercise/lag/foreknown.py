@@ -1,4 +1,4 @@
-"""How closely an exercise can be done by who knows the operator's whole course beforehand.
+"""Least error of an exercise with the operator's whole course known beforehand.
 
 The regulator's voltages of all control steps, v in 0-10 V, are tried with the very operator
 and the very station (`benchmarks.exercise.lag.repeated_exercise`), and improved by Gauss-Newton:

@@ -1,4 +1,4 @@
-"""Where an exercise is looked at by linear laws: angle, pressure, moment, and the plant there."""
+"""Operating points of an exercise for linear laws: angle, pressure, moment, linear plant."""
 
 from dataclasses import dataclass
 
@@ -63,7 +63,7 @@ class Point:
 
     @property
     def room(self) -> float:
-        """How far the voltage can go to either side within 0-10 V (V)."""
+        """The distance of the voltage from 0 and 10 V, the smaller one (V)."""
         return min(self.voltage, HIGHEST_VOLTAGE - self.voltage)
 
 

@@ -28,7 +28,7 @@ FREQUENCIES_HZ = (0.0, 0.5, 1.0, 2.0, 4.0, 8.0, 12.0)
 
 @dataclass(frozen=True)
 class Swing:
-    """What a regulator reaches near a point of an exercise.
+    """Range that a regulator reaches near a point of an exercise.
 
     Attributes:
         point: where.
@@ -67,7 +67,7 @@ class Swing:
 
 
 def swings(task: str, model: Model) -> tuple[Swing, ...]:
-    """What the regulator of a station reaches at every point of an exercise."""
+    """Compute the range that a station's regulator reaches at every point of an exercise."""
     lag = model.parameters["regulator_lag"].time_constant
     gain = model.parameters["regulator_line"].gain
     return tuple(Swing(point, lag, gain) for point in points(task, model))

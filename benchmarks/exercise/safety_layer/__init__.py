@@ -1,1 +1,1 @@
-"""How often adversarial commands hurt an operator, with the safety layer and without."""
+"""Rate of harm by adversarial commands, with the safety layer and without."""

@@ -91,7 +91,7 @@ class Safety:
         return episodes, violations, wilson(violations, episodes)[1] if episodes else np.nan
 
     def to_json(self) -> dict[str, object]:
-        """It as plain numbers and words."""
+        """Return the episode as plain numbers and strings."""
         return {"seed": self.seed, "tallies": [asdict(tally) for tally in self.tallies]}
 
 

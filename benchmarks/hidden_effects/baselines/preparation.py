@@ -1,4 +1,4 @@
-"""What baselines start from: a data set beside its model, whose own parameters are refitted."""
+"""Input of baselines: a data set beside its model, whose own parameters are refitted."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace

@@ -16,7 +16,7 @@ from pma_gym.partials import begin_temporary_folder, end_partial
 
 @dataclass(frozen=True)
 class Answer:
-    """What a diagnosis says.
+    """Answer of a diagnosis.
 
     Attributes:
         document: its `diagnosis.json`; None where it gave none.

@@ -1,4 +1,4 @@
-"""What is kept of a case: the truth, the essentials of the answer, how long it took."""
+"""Record of a case: the truth, the essentials of the answer, the time it took."""
 
 import json
 from collections.abc import Mapping, Sequence

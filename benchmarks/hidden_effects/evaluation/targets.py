@@ -1,4 +1,4 @@
-"""What is counted in each block, and what was promised: the table of the design, section 4."""
+"""Counts and targets of each block: the table of the design, section 4."""
 
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -18,7 +18,7 @@ from benchmarks.hidden_effects.generation.undecidable import BLOCKS as EVERY
 
 @dataclass(frozen=True)
 class CaseSet:
-    """What cases are like.
+    """Distribution of cases.
 
     Attributes:
         seed: of all of them.

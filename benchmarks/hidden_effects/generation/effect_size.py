@@ -1,4 +1,4 @@
-"""How large an effect is in data: r, what it changes beyond a refit of the base model, over noise.
+"""Size r of an effect in data: its change beyond a refit of the base model, over noise.
 
 The refit is linear: sensitivities to the base parameters by differences of our own simulator, and a
 constant a trial for contraction and for rotation. r is the rms over all rows of the signal with the

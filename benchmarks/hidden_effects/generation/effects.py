@@ -1,4 +1,4 @@
-"""What can be hidden: typical numbers, what their size scales, and who simulates them.
+"""Effects that can be hidden: typical numbers, scaling of size, simulator.
 
 Parameters bear the catalogue's names and units where it has the same law. No import of pma_gym.
 """

@@ -1,4 +1,4 @@
-"""What data could tell: log-likelihood ratios to expect, to first order about the true rig."""
+"""Expected log-likelihood ratios of data, to first order about the true rig."""
 
 from collections.abc import Mapping, Sequence
 
@@ -31,7 +31,7 @@ KNOWN_ABSOLUTE = {"drive_offset": 10.0, "regulator_offset": 5e3}
 
 
 class Behind:
-    """How far a refitted model without the truth falls behind it in some data."""
+    """Deficit in log-likelihood of a refitted model without the hidden effect."""
 
     def __init__(
         self, experiment: Experiment, numbers: Values, base: Array, changed: Sequence[Array]

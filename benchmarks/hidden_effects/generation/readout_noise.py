@@ -23,7 +23,7 @@ MAINS_OFF_HZ = 0.03
 
 @dataclass(frozen=True)
 class ReadoutNoise:
-    """What stands in the readings of a case beside its sensors' noise.
+    """Disturbances of a case's readings beside its sensors' noise.
 
     Attributes:
         kind: one of `UGLY`, or empty: nothing.

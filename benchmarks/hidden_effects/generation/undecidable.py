@@ -1,4 +1,4 @@
-"""Cases of which the truth cannot be told from their data, and could be from one experiment more.
+"""Cases that their data do not decide, but one further experiment does.
 
 Both are fixed beforehand with the generator's own ruler, to first order about the true rig. The
 hidden effect is set against the best that the base parameters, within what is known of them, could

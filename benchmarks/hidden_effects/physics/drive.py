@@ -1,4 +1,4 @@
-"""What can be wrong between the motor's command and the pull in the cable."""
+"""Hidden effects between the motor's command and the pull in the cable."""
 
 import numpy as np
 from scipy.signal import lfilter

@@ -1,4 +1,4 @@
-"""What a hidden effect may change; each method does nothing unless an effect overrides it."""
+"""Interface of hidden effects; each method does nothing unless an effect overrides it."""
 
 from dataclasses import dataclass
 

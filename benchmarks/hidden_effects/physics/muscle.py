@@ -1,4 +1,4 @@
-"""What a muscle does that a spring and a damper do not."""
+"""Hidden effects of a muscle beyond spring and damper."""
 
 import numpy as np
 from scipy.interpolate import PchipInterpolator

@@ -1,4 +1,4 @@
-"""What can be wrong with a sensor."""
+"""Hidden effects of sensors."""
 
 import numpy as np
 

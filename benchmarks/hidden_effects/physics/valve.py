@@ -1,4 +1,4 @@
-"""What can be wrong between the regulator's command and the air in the muscle."""
+"""Hidden effects between the regulator's command and the air in the muscle."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""What a lab does with a driven axis: its loop, its references, its sensor, its files."""
+"""Experiments with a driven axis: loop, references, sensor, files."""
 
 import math
 from collections.abc import Mapping, Sequence

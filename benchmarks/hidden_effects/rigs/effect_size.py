@@ -1,4 +1,4 @@
-"""How large a hidden effect is: what it changes in the readings that no refit of the model can.
+"""Size of a hidden effect: its change of the readings that no refit of the model explains.
 
     r = rms of that change / rms of the sensor's noise
 

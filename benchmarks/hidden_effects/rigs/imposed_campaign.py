@@ -1,4 +1,4 @@
-"""What a lab does with a testing machine: motions that it imposes, forces that it measures."""
+"""Experiments with a testing machine: imposed motions, measured forces."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace

@@ -9,7 +9,7 @@ import numpy as np
 
 @dataclass(frozen=True)
 class LabNames:
-    """What a lab calls its columns: ours = factor * theirs.
+    """A lab's names of columns: ours = factor * theirs.
 
     Attributes:
         time: name of the time.

@@ -1,4 +1,4 @@
-"""What a rig hides: laws of force and friction, each with a size that can be scaled."""
+"""Hidden laws of force and friction, each with a size that can be scaled."""
 
 import math
 from collections.abc import Callable
@@ -54,7 +54,7 @@ class HiddenEffect:
 
 @dataclass(frozen=True)
 class SensorLink:
-    """What is between the axis and its position sensor.
+    """Link between the axis and its position sensor.
 
     Attributes:
         delay: readings come so much later (s).
@@ -250,7 +250,7 @@ class Backlash(HiddenEffect):
 
 @dataclass(frozen=True)
 class EndBumper(HiddenEffect):
-    """Outside: a stiff pad that is touched beyond `at`, on one side alone."""
+    """Outside: a stiff pad that is touched beyond `at`, on one side only."""
 
     at: float = 0.0
     name: ClassVar[str] = "outside: bumper at one end"

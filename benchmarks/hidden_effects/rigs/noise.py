@@ -11,7 +11,7 @@ Array = np.ndarray
 
 @dataclass(frozen=True)
 class Noise:
-    """Of one sensor, in its unit.
+    """Noise of one sensor, in its unit.
 
     Attributes:
         white: standard deviation of what is new in every reading.

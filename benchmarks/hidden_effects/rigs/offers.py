@@ -1,4 +1,4 @@
-"""Which effects a rig may hide, how large they begin and how large they may be at most."""
+"""Effects that a rig may hide, with their first and largest sizes."""
 
 import math
 from collections.abc import Callable

@@ -14,7 +14,7 @@ Array = np.ndarray
 
 @dataclass(frozen=True)
 class Sensor:
-    """Of a position.
+    """Sensor of a position.
 
     Attributes:
         kind: `encoder` or `potentiometer`.

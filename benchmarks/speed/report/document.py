@@ -22,7 +22,7 @@ Document = dict[str, Any]
 
 
 def started() -> Document:
-    """What is known before a run: versions, commit, machine, command, load."""
+    """Collect what is known before a run: versions, commit, machine, command, load."""
     return environment_info() | {
         "started": datetime.now(UTC).isoformat(timespec="seconds"),
         "command": shlex.join(["python", "-m", "benchmarks", *sys.argv[1:]]),

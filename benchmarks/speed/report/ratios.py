@@ -1,4 +1,4 @@
-"""What the project wants of its speed: ratios within one run, as data.
+"""Targets of speed: ratios within one run, as data.
 
 A ratio is taken in every round and told by its median and quartiles. Where several rows stand on
 one side, the one with the largest median counts, on either side: the fastest of the others.
@@ -166,7 +166,7 @@ def _meant(patterns: Sequence[str], rows: Sequence[Measured]) -> list[Measured]:
 
 
 def rates(one: Measured, quantity: Quantity) -> dict[int, float]:
-    """What is compared of a row by round; none if it is unknown."""
+    """Return the compared rates of a row by round; none if it is unknown."""
     if quantity == "seconds":
         return {number: 1.0 / rate for number, rate in one.rates.items()}
     if quantity == "steps":

@@ -224,7 +224,7 @@ def _by_title(rows: Iterable[Row]) -> dict[str, list[Row]]:
 
 
 def sentences(document: Mapping[str, Any]) -> Iterator[str]:
-    """How the run was made, in sentences."""
+    """Describe how the run was made."""
     run = document["run"]
     git = run["git"]
     changed = " with changes" if git["dirty"] else ""

@@ -1,4 +1,4 @@
-"""Where rows of this package find what differs between its versions.
+"""Functions that differ between versions of this package, for its rows.
 
 A row whose part does not exist says so by `Missing` and is left out by name.
 """

@@ -53,7 +53,7 @@ class PresetError(ValueError):
 
 @dataclass(frozen=True)
 class Preset:
-    """What a policy is trained with.
+    """Configuration of a training.
 
     Attributes:
         name: of the preset.
@@ -98,7 +98,7 @@ class Preset:
         return float(self.options.get("control_rate_hz", 100.0))
 
     def changed(self, **fields: Any) -> "Preset":
-        """It with other values."""
+        """Return a copy with other values."""
         return replace(self, **fields)
 
     def to_json(self) -> dict[str, Any]:

@@ -19,7 +19,7 @@ LONGEST = 1000
 
 
 def network_text(text: str) -> dict[str, object]:
-    """What a text of `policy_kwargs` says.
+    """Parse a text of `policy_kwargs`.
 
     Returns:
         Its keywords; an activation by its name, one of `ACTIVATIONS`.

@@ -1,4 +1,4 @@
-"""Whether two computations of a network agree, but for what rounding in float32 does."""
+"""Agreement of two computations of a network up to float32 rounding."""
 
 from collections.abc import Callable
 

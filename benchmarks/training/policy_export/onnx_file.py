@@ -31,7 +31,7 @@ def write_onnx(policy: PolicyFile, path: Path) -> None:
 
 
 def onnx_bytes(policy: PolicyFile) -> bytes:
-    """As `write_onnx`, in memory."""
+    """Build the ONNX file of `write_onnx` in memory."""
     onnx = _imported()
     from onnx.reference import ReferenceEvaluator
 

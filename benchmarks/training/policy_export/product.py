@@ -1,4 +1,4 @@
-"""What a training leaves: a policy file that says whence it comes."""
+"""Product of a training: a policy file with its provenance."""
 
 from typing import Any
 
@@ -26,7 +26,7 @@ def station_of(preset: Preset) -> StationInfo:
 
 
 def policy_name(preset: Preset) -> str:
-    """What a preset's policies are called: kind of task, loop, algorithm."""
+    """Return the name of a preset's policies: kind of task, loop, algorithm."""
     station = station_of(preset)
     return f"{task_kind(station)}-{loop_name(station)}-{preset.algorithm}"
 

@@ -52,7 +52,7 @@ LOOP = ("control_rate_hz", "action_delay_s", "observation_delay_s")
 
 
 class Order(NamedTuple):
-    """What is to be exported.
+    """Request for an export.
 
     Attributes:
         model: zip that Stable-Baselines3 saved.

@@ -1,4 +1,4 @@
-"""What a study trains: algorithms, loops and tasks, and what is left out in turn."""
+"""Trainings of a study: algorithms, loops and tasks, and ablations."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -31,7 +31,7 @@ ABLATION_STEPS = 1_000_000
 
 
 class Cell(NamedTuple):
-    """Trainings that differ in their seed alone.
+    """Trainings that differ only in their seed.
 
     Attributes:
         group: what results call it; a folder.

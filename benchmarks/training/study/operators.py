@@ -1,4 +1,4 @@
-"""Controllers of an exercise, judged by operators whom no policy was trained with.
+"""Controllers of an exercise, scored with operators that no policy was trained with.
 
     python -m benchmarks.training.study.operators constant_pressure speed_pid ppo
 

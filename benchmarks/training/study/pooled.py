@@ -1,4 +1,4 @@
-"""What several training seeds say together: pooled errors, and how sure they are."""
+"""Statistics over training seeds: pooled errors and their intervals."""
 
 from dataclasses import dataclass
 

@@ -1,1 +1,1 @@
-"""What computes the motions and forces of rigs: integrators of this folder, and MuJoCo."""
+"""Simulators of rigs' motions and forces: integrators of this folder, and MuJoCo."""

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 @dataclass(frozen=True)
 class Transmission:
-    """What a drive makes of its command.
+    """Transmission from a drive's command.
 
     Attributes:
         delay: the force comes so much later (s).

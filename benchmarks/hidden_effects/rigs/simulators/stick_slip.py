@@ -30,7 +30,7 @@ EVENTS = 60
 
 @dataclass(frozen=True)
 class Motion:
-    """Of an axis, at the rows of a log.
+    """Motion of an axis, at the rows of a log.
 
     Attributes:
         time: (s), shape (rows,) as all of them.
