@@ -19,6 +19,7 @@ GALLERY = (
         "hidden_effect",
         "joint",
         "servo_pendulum",
+        "servo_wheel",
         "tensile_test",
     ),
     *("cylinder_seal", "own_effect"),

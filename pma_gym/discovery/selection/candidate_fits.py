@@ -25,8 +25,15 @@ LEAST_KEPT = 0.7
 """Share of the gain that a score promised below which a fit is tried again from a scan of the
 candidate's range."""
 
+ALIKE = 0.05
+"""Share of chi-square within which two fits ended at the same minimum: a further beginning that
+ends there too tells nothing new."""
+
 BEST_SCANNED = 4
 """From how many values of that scan fits are begun."""
+
+LIKELY = 0.25
+"""Share of the best score's promise from which on a candidate is fitted from more beginnings."""
 
 LEAST_FITTED = 0.35
 """The same, below which a candidate counts as one that could not be fitted."""
@@ -74,18 +81,25 @@ def fitted(
         return kept
     best: Fitted | None = None
     whitened = probed(problem, before, each.candidate)
-    for begun in starting_points(baseline, whitened, each)[: ALL_BEGUN if caught else BEGUN]:
-        fit = problem.fit(before.model, extra, {each.candidate.name: begun})
+    for model, begun in _beginnings(problem, baseline, whitened, before, each, caught):
+        fit = problem.fit(model, extra, {each.candidate.name: begun})
         if fit is not None and caught:
             fit = problem.continuation(fit, extra)
+        alike = _alike(best, fit)
         if fit is not None and (best is None or fit.chi_square < best.chi_square):
             best = fit
-        # As much as the look promised, or near at last: no other beginning is needed.
+        # As much as the look promised, or near at last: no other beginning is needed. Nor is one
+        # where the last two ended alike.
         if best is not None and (
-            not problem.far(best) if caught else before.chi_square - best.chi_square >= each.gain
+            alike or not problem.far(best)
+            if caught
+            else before.chi_square - best.chi_square >= each.gain
         ):
             break
-    if best is None or before.chi_square - best.chi_square < LEAST_KEPT * each.gain:
+    kept = 0.0 if best is None else before.chi_square - best.chi_square
+    # Far from the trials a promise of less than two like fits differ by is not worth a scan.
+    slight = problem.far(before) and each.gain < ALIKE * before.chi_square
+    if kept < LEAST_KEPT * each.gain and not slight:
         for begun in scanned_range(baseline, whitened, each).values[:BEST_SCANNED]:
             fit = problem.fit(before.model, extra, {each.candidate.name: begun})
             if fit is not None and (best is None or fit.chi_square < best.chi_square):
@@ -95,6 +109,39 @@ def fitted(
         return None
     journal.keep(key, kept_form(best))
     return best
+
+
+def _alike(one: Fitted | None, other: Fitted | None) -> bool:
+    """Whether two fits ended at the same chi-square, as far as a choice of effects goes."""
+    if one is None or other is None:
+        return False
+    return abs(one.chi_square - other.chi_square) < ALIKE * min(one.chi_square, other.chi_square)
+
+
+def _beginnings(
+    problem: FitProblem,
+    baseline: Baseline,
+    whitened: WhitenedResiduals,
+    before: Fitted,
+    each: ScreeningScore,
+    caught: bool,
+) -> list[tuple[Model, np.ndarray]]:
+    """Models and values of a candidate that fits begin from.
+
+    Far from the trials the refitted parameters may stand in for what is missing: from the likeliest
+    values a fit then begins at the parameters as they were given, too.
+    """
+    points = starting_points(baseline, whitened, each)[: ALL_BEGUN if caught else BEGUN]
+    pairs = [(before.model, begun) for begun in points]
+    if problem.far(before) and pairs:
+        pairs.insert(0, (before.model.replace(_given(problem)), points[0]))
+    return pairs
+
+
+def _given(problem: FitProblem) -> dict[str, float]:
+    """The model's own parameters as they were given, by path."""
+    own = problem.own.free
+    return dict(zip(own, values(problem.given, own).tolist(), strict=True))
 
 
 def unfitted(
@@ -171,8 +218,10 @@ def restarted(
     better: dict[str, Fitted] = {}
     if not all(map(problem.far, fits.values())):
         return better
-    for number, name in enumerate(sorted(fits, key=lambda each: cost(fits[each]))):
-        progress(f"fitting effect {len(chosen) + 1} from more beginnings", number, len(fits))
+    most = max((known[name].gain for name in fits), default=0.0)
+    likely = [name for name in fits if known[name].gain >= LIKELY * most]
+    for number, name in enumerate(sorted(likely, key=lambda each: cost(fits[each]))):
+        progress(f"fitting effect {len(chosen) + 1} from more beginnings", number, len(likely))
         restart = fitted(problem, baseline, before, chosen, known[name], journal, caught=True)
         if restart is not None and restart.chi_square < fits[name].chi_square:
             better[name] = restart
@@ -187,10 +236,7 @@ def better(
     """A fit, or a better one from a careful search: what it misses would look like an effect."""
 
     def search() -> Fitted:
-        given = dict(
-            zip(problem.own.free, values(problem.given, problem.own.free).tolist(), strict=True)
-        )
-        refit = problem.careful_fit(fit.model.replace(given), chosen)
+        refit = problem.careful_fit(fit.model.replace(_given(problem)), chosen)
         best = fit if refit is None or refit.chi_square >= fit.chi_square else refit
         return problem.continuation(best, chosen)
 

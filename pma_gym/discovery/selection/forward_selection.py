@@ -38,6 +38,7 @@ from pma_gym.discovery.selection.candidate_fits import (
     unfitted,
     without_idle,
 )
+from pma_gym.discovery.selection.unscored_fits import unscored_fits
 
 ALARM = 0.005
 """Family-wise rate of false alarms that the gate lets through."""
@@ -176,11 +177,7 @@ def _stage(
 ) -> Stage:
     shared, astray = problem, problem.astray(before)
     if astray:
-        # A motor that is all but locked hides what holds it. Looks and fits begin beside what was
-        # assumed of the parameters, and stay there until an effect is added.
-        held = problem.fit_as_assumed(before, chosen)
-        before = before if held is None else held
-        problem = replace(problem, widens=False)
+        problem, before = _as_assumed(problem, before, chosen)
     step = f"looking for effect {len(chosen) + 1}"
     progress(step, 0, len(rest))
     baseline = Baseline.at(
@@ -215,12 +212,30 @@ def _stage(
             refit = fitted(problem, baseline, before, chosen, each, journal)
             if refit is not None:
                 fits[each.candidate.name] = refit
+        scored, tried = dict(fits), {each.candidate.name for each in worth[:TRIED]}
+        if far:
+            others = [each for each in scores if each.candidate.name not in tried]
+            fits |= unscored_fits(
+                problem, baseline, before, chosen, others, fits, journal, progress
+            )
         if not astray:
-            fits |= restarted(problem, baseline, before, chosen, worth, fits, journal, progress)
+            fits |= restarted(problem, baseline, before, chosen, worth, scored, journal, progress)
         failed = unfitted(problem, baseline, before, chosen, worth[:TRIED], fits)
     if scan.excess and all(before.chi_square - fit.chi_square < least for fit in fits.values()):
         gate, fits, scores, scan = (), {}, plainly, NO_EXCESS
     return Stage(shared, before, baseline, tuple(scores), fits, gate, missing, scan, failed)
+
+
+def _as_assumed(
+    problem: FitProblem, before: Fitted, chosen: tuple[CandidateEffect, ...]
+) -> tuple[FitProblem, Fitted]:
+    """Trials and fit within what was assumed of the parameters.
+
+    A motor that is all but locked hides what holds it. Looks and fits begin beside what was assumed
+    of the parameters, and stay there until an effect is added.
+    """
+    held = problem.fit_as_assumed(before, chosen)
+    return replace(problem, widens=False), before if held is None else held
 
 
 def _refined_scores(
