@@ -107,7 +107,9 @@ def _finer(candidate: CandidateEffect, scores: ProbeScores) -> CandidateEffect:
     if not candidate.amplitudes.any() or not scores.strengths.any():
         return candidate
     usual = int(np.argmax(scores.strengths))
-    away = np.abs(candidate.probes - candidate.absent)[:, candidate.amplitudes]
+    # A delay counts from 0, as `grown` has it: a probe at its usual value is no size of 0.
+    origin = candidate.absent if candidate.fitted.all() else np.zeros_like(candidate.absent)
+    away = np.abs(candidate.probes - origin)[:, candidate.amplitudes]
     sizes = away.max(axis=1) / away[usual].max()
     seen = float(np.sqrt(SHOWN_GAIN / scores.strengths[usual]))
     least = float(sizes.min())

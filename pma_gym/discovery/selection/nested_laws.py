@@ -6,10 +6,11 @@ the parameter is not determined: it is held at that limit, the fit is repeated w
 value is given for it, only the bound that the profile has on the other side. An effect may also
 say that a simpler law of its own sets one parameter equal to another (`Effect.ties`); the whole law
 stays where it explains more than its further parameters cost, of readings left out too, and where
-none of them is at an end of its range: such a law borrows the effect's form for something else.
+the parameter that may be equal is not at an end of its range: a static friction of 0 N borrows the
+law's form for something else.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -167,7 +168,7 @@ def _tied(problem: FitProblem, state: Nested, place: int) -> Nested | None:
         # What the whole law explains more must be worth its parameters, as anywhere.
         if equal is not None and (
             cost(equal.fit) < cost(state.fit)
-            or _ended(problem, state, (path, *rest))
+            or _ended(problem, state, path)
             or not _asked_for(problem, state, equal)
         ):
             known = {each: Undetermined(None, None, unit(each)) for each in (path, *rest)}
@@ -175,8 +176,8 @@ def _tied(problem: FitProblem, state: Nested, place: int) -> Nested | None:
     return None
 
 
-def _ended(problem: FitProblem, state: Nested, paths: Sequence[str]) -> bool:
-    """Whether one of some parameters is at an end of the range that its fit had."""
+def _ended(problem: FitProblem, state: Nested, path: str) -> bool:
+    """Whether a parameter is at an end of the range that its fit had."""
     whitened = problem.whitened_at(state.fit, state.chosen)
     ranges = dict(
         zip(
@@ -185,7 +186,7 @@ def _ended(problem: FitProblem, state: Nested, paths: Sequence[str]) -> bool:
             strict=True,
         )
     )
-    return any(bool(at_limit(state.fit.estimate(path)[0], *ranges[path])) for path in paths)
+    return bool(at_limit(state.fit.estimate(path)[0], *ranges[path]))
 
 
 def _asked_for(problem: FitProblem, whole: Nested, simpler: Nested) -> bool:
