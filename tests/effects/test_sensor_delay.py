@@ -26,7 +26,7 @@ def test_every_sensor_of_the_catalogue_may_be_late():
 def test_a_late_load_cell_reads_the_tension_of_before(station, station_with):
     time = np.arange(0.0, 2.0, 0.002)
     tones = [(0.4, 0.0), (1.1, 1.0), (3.0, 2.0)]
-    pull = 3.0 + 0.5 * sum(np.sin(2.0 * np.pi * f * time + p) for f, p in tones)
+    pull = 3.0 + 0.5 * np.sum([np.sin(2.0 * np.pi * f * time + p) for f, p in tones], axis=0)
     trial = Trial(time, {"motor_voltage": pull, "regulator_voltage": 0.0 * time + 5.5})
     plant = station_with("load_cell_delay", delay_ms=1e3 * DELAY_S)
     plain, late = (each.simulate(trial, noise=False) for each in (station, plant))
