@@ -44,7 +44,7 @@ _PRESSURE_TOLERANCE = 1.0
 
 
 class Interpolate(StrEnum):
-    """What happens between two rows of commands."""
+    """Interpolation of commands between two rows."""
 
     FOH = "foh"
     ZOH = "zoh"
@@ -126,7 +126,7 @@ def evaluate(
     ],
     as_json: JsonOption = False,
 ) -> None:
-    """Give a logged trial its rows of tables 20-22 or 24-30: regression, variance and RMSE."""
+    """Score a logged trial as tables 20-22 or 24-30 do: regression, variance and RMSE."""
     # Imported here: the studies bring python-control along, and that brings matplotlib.
     from pma_gym.studies import evaluation
 
@@ -179,7 +179,7 @@ app.command(
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """The console script: what cannot be used ends in one message and exit code 2."""
+    """Run the console script; unusable input ends in one message and exit code 2."""
     with safe_streams():
         try:
             app(args=None if arguments is None else list(arguments), prog_name="pma-gym")
