@@ -33,7 +33,10 @@ def logs(*channels):
     fine = np.arange(0.0, time[-1] + BEFORE_S, 5e-4)
     for _ in range(2):
         waves = [(generator.uniform(0.1, 0.3), f, generator.uniform(0, 6)) for f in (0.4, 1.1, 2.3)]
-        torque = np.sum([a * np.sin(2 * np.pi * f * fine + p) for a, f, p in waves], axis=0)
+        rows = np.arange(0.0, fine[-1] + 0.01, 0.01)
+        asked = np.sum([a * np.sin(2 * np.pi * f * rows + p) for a, f, p in waves], axis=0)
+        # Between its rows the command is a line, in the truth and in the model.
+        torque = np.interp(fine, rows, asked)
         exact = heavier.simulate(Trial(fine, {"torque_command": torque}), noise=False).measurements
         command = np.interp(time + BEFORE_S, fine, torque)
         for _ in range(2):
@@ -52,12 +55,14 @@ def test_one_late_column_is_that_sensors_delay_with_its_size():
     (effect,) = diagnosis.effects
     assert effect.name == "encoder_delay", diagnosis.sentence
     delay = effect.parameters["delay_ms"]
-    assert abs(delay.value - 1e3 * DELAY_S) < 0.1
-    assert delay.low and delay.high and delay.high - delay.low < 0.3
+    assert delay.low and delay.high and delay.low < 1e3 * DELAY_S < delay.high
+    assert delay.high - delay.low < 0.1
     assert abs(diagnosis.model.parameters["inertia"].inertia / 0.0105 - 1.0) < 5e-3
 
 
 def test_with_one_column_the_delays_of_sensor_and_command_are_rivals():
     diagnosis = diagnose(logs("angle"), ARM, propose=False)
-    assert diagnosis.verdict == "undecidable" and not diagnosis.effects
-    assert "encoder delay" in diagnosis.sentence and "drive delay" in diagnosis.sentence
+    (effect,) = diagnosis.effects
+    late = {"encoder_delay", "encoder_lag", "drive_delay", "drive_lag"}
+    assert {effect.name, *effect.confused_with} == late, diagnosis.sentence
+    assert all(name.replace("_", " ") in diagnosis.sentence for name in late)

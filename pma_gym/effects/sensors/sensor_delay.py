@@ -14,6 +14,7 @@ from typing import Annotated, NamedTuple
 
 from pma_gym.effects.delay import ladder
 from pma_gym.effects.effect import Effect
+from pma_gym.effects.sensors.sensors import FORCE_SENSOR, JOINT_SENSORS, SENSORS, TACHOMETER
 from pma_gym.units import Quantity
 
 ELEMENTS = (1.0 / 12.0, 3.0 / 13.0, 169.0 / 510.0, 17.0 / 39.0)
@@ -28,57 +29,8 @@ _DELAY = Quantity(
 )
 
 
-class LvdtDelay(NamedTuple):
-    """Delay of the measured contraction."""
-
-    share: Annotated[float, _SHARE]
-    delay: Annotated[float, _DELAY]
-
-
-class LoadCellDelay(NamedTuple):
-    """Delay of the measured tension."""
-
-    share: Annotated[float, _SHARE]
-    delay: Annotated[float, _DELAY]
-
-
-class PressureTransducerDelay(NamedTuple):
-    """Delay of the measured pressure."""
-
-    share: Annotated[float, _SHARE]
-    delay: Annotated[float, _DELAY]
-
-
-class PotentiometerDelay(NamedTuple):
-    """Delay of the measured angle of the pulley."""
-
-    share: Annotated[float, _SHARE]
-    delay: Annotated[float, _DELAY]
-
-
-class EncoderDelay(NamedTuple):
-    """Delay of the measured angle of a joint."""
-
-    share: Annotated[float, _SHARE]
-    delay: Annotated[float, _DELAY]
-
-
-class GyroscopeDelay(NamedTuple):
-    """Delay of the measured speed of a joint."""
-
-    share: Annotated[float, _SHARE]
-    delay: Annotated[float, _DELAY]
-
-
-class TachometerDelay(NamedTuple):
-    """Delay of the measured speed of a slide."""
-
-    share: Annotated[float, _SHARE]
-    delay: Annotated[float, _DELAY]
-
-
-class ForceSensorDelay(NamedTuple):
-    """Delay of the force measured at a drive that imposes a motion."""
+class SensorDelay(NamedTuple):
+    """Delay of what a sensor reads."""
 
     share: Annotated[float, _SHARE]
     delay: Annotated[float, _DELAY]
@@ -115,11 +67,11 @@ def late_reading_rate(signal, memory, p):
     return ladder(p.share * signal, memory, p.delay, ELEMENTS)
 
 
-def _delay(sensor: str, output: str, parameters: type) -> Effect:
+def _delay(sensor: Effect) -> Effect:
     return Effect(
-        name=f"{sensor}_delay",
-        port=f"sensor_delay:{output}",
-        parameters=parameters,
+        name=f"{sensor.name}_delay",
+        port=sensor.port.replace("sensor:", "sensor_delay:"),
+        parameters=SensorDelay,
         law=late_reading,
         rate=late_reading_rate,
         signature=(
@@ -131,14 +83,7 @@ def _delay(sensor: str, output: str, parameters: type) -> Effect:
     )
 
 
-SENSOR_DELAYS: tuple[Effect, ...] = (
-    _delay("lvdt", "contraction", LvdtDelay),
-    _delay("load_cell", "load", LoadCellDelay),
-    _delay("pressure_transducer", "pressure", PressureTransducerDelay),
-    _delay("potentiometer", "rotation", PotentiometerDelay),
-    _delay("encoder", "angle", EncoderDelay),
-    _delay("gyroscope", "speed", GyroscopeDelay),
-    _delay("tachometer", "velocity", TachometerDelay),
-    _delay("force_sensor", "force", ForceSensorDelay),
+SENSOR_DELAYS: tuple[Effect, ...] = tuple(
+    _delay(sensor) for sensor in (*SENSORS, *JOINT_SENSORS, TACHOMETER, FORCE_SENSOR)
 )
 """Delays of all sensors, as effects of the catalogue."""
