@@ -254,29 +254,29 @@ def test_processes_that_make_the_key_at_once_end_with_one(tmp_path):
     code = (
         "import sys, pathlib\n"
         "from pma_gym.codegen.cache.signing import user_key\n"
-        "print('ready', flush=True); sys.stdin.readline()\n"
-        "print(user_key(pathlib.Path(sys.argv[1])).hex())"
+        "print('ready', flush=True)\n"
+        "for folder in sys.stdin:\n"
+        "    print(user_key(pathlib.Path(folder.strip())).hex(), flush=True)"
     )
+    made = [
+        subprocess.Popen(
+            [sys.executable, "-c", code], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+        )
+        for _ in range(4)
+    ]
+    for process in made:
+        assert process.stdout.readline() == "ready\n"
     for round_ in range(3):
         folder = tmp_path / str(round_)
         folder.mkdir(mode=0o700)
-        made = [
-            subprocess.Popen(
-                [sys.executable, "-c", code, str(folder)],
-                stdin=subprocess.PIPE,
-                stdout=subprocess.PIPE,
-                text=True,
-            )
-            for _ in range(4)
-        ]
         for process in made:
-            assert process.stdout.readline() == "ready\n"
-        for process in made:
-            process.stdin.write("\n")
+            process.stdin.write(f"{folder}\n")
             process.stdin.flush()
-        keys = {process.communicate()[0].strip() for process in made}
+        keys = {process.stdout.readline().strip() for process in made}
         assert keys == {(folder / signing.KEY_FILE).read_bytes().hex()}
         assert [path.name for path in folder.iterdir()] == [signing.KEY_FILE]
+    for process in made:
+        process.communicate()
 
 
 def test_without_hard_links_the_key_is_made_too(tmp_path, monkeypatch):

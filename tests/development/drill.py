@@ -48,7 +48,8 @@ def copied(folder: Path, *names: str) -> Path:
         source, target = ROOT / name, folder / name
         target.parent.mkdir(parents=True, exist_ok=True)
         if source.is_dir():
-            skip = shutil.ignore_patterns("__pycache__", "*.safetensors")
+            # With the bytecode, which is still that of what a page leaves as it is.
+            skip = shutil.ignore_patterns("*.safetensors")
             shutil.copytree(source, target, ignore=skip)
         else:
             shutil.copy(source, target)

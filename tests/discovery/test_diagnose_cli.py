@@ -23,14 +23,12 @@ def pull(period, pressure):
 
 @pytest.fixture(scope="module")
 def lab(tmp_path_factory):
-    """Four logs of a station with 25 N of dry friction."""
+    """Two logs of a station with 25 N of dry friction."""
     folder = tmp_path_factory.mktemp("data") / "lab"
     folder.mkdir()
     friction = {"coulomb_friction.static_n": 25.0, "coulomb_friction.dynamic_n": 20.0}
     rig = Plant(load_model("serres2008").replace(friction))
-    for seed, (period, pressure) in enumerate(
-        (period, pressure) for period in (1.3, 2.0) for pressure in (200e3, 450e3)
-    ):
+    for seed, (period, pressure) in enumerate(((1.3, 200e3), (2.0, 450e3))):
         trial = rig.simulate(pull(period, pressure), seed=seed)
         write_trial(trial, folder / f"pull_{period:g}s_{pressure / 1e3:g}kPa.csv")
     return folder

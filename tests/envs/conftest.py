@@ -206,7 +206,7 @@ def options(request) -> dict:
 @pytest.fixture(params=BATCHES, ids=lambda options: "-".join(map(str, options.values())))
 def batch_options(request, fragile) -> dict:
     """Options of batches: every autoreset mode, threads and precisions, ends of both kinds."""
-    made = {"control_rate_hz": 4.0, "model": fragile, "pressure_kpa": [250.0, 300.0]}
+    made = {"control_rate_hz": 10.0, "model": fragile, "pressure_kpa": [250.0, 300.0]}
     return request.param | made
 
 

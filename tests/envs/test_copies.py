@@ -57,16 +57,16 @@ def test_a_copy_of_a_batch_goes_on_with_the_same_bits(
     way, batch_options, randomisation, batch_course, same
 ):
     made = COPIERS[way]
-    envs = PMAVectorEnv(21, randomisation=randomisation, **batch_options)
+    envs = PMAVectorEnv(17, randomisation=randomisation, **batch_options)
     assert same(made(envs).reset(seed=3), envs.reset(seed=3))
     ends = 0
-    for _ in range(4):
-        for seen in batch_course(envs, 9):
+    for steps in (9, 40):
+        for seen in batch_course(envs, steps):
             ends += int(np.sum(seen[2] | seen[3])) if len(seen) == 5 else 0
         other = made(envs)
         assert other.engine.threads == envs.engine.threads
-        ahead = batch_course(envs, 25)
-        assert same(batch_course(other, 25), ahead)
+        ahead = batch_course(envs, 15)
+        assert same(batch_course(other, 15), ahead)
         other.close()
     assert ends > 5
     envs.close()

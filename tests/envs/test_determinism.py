@@ -8,7 +8,7 @@ import pytest
 
 from pma_gym.codegen.machine import native
 from pma_gym.envs import PMAEnv
-from pma_gym.plant.model import Model, load_model
+from pma_gym.plant.model import Model, load_model, shipped_models
 from pma_gym.plant.parameter_rows import Note
 from pma_gym.plant.statics import muscle_force
 from pma_gym.tasks import CORNERS, FORCE_TOLERANCE
@@ -37,8 +37,14 @@ def bits(env: PMAEnv, seed: int | None, options: dict | None = None) -> bytes:
     return b"".join(parts)
 
 
-@pytest.mark.parametrize("randomisation", ["none", "intervals", "varied"])
-def test_same_seed_same_bits(make, randomisation, model):
+@pytest.mark.parametrize(
+    ("model", "randomisation"),
+    [
+        *((name, "none") for name in sorted(shipped_models())),
+        *((name, how) for name in ("station", "cascade") for how in ("intervals", "varied")),
+    ],
+)
+def test_same_seed_same_bits(make, model, randomisation):
     options = {"randomisation": randomisation, "pressure_kpa": "random", "model": model}
     first, second = make(**options), make(**options)
     assert bits(first, 7) == bits(second, 7)
@@ -133,7 +139,7 @@ def test_intervals_are_met_in_all_their_width(make, uncertain):
 @pytest.mark.parametrize("randomisation", ["intervals", "varied"])
 @pytest.mark.parametrize("task", ["displacement", "rotation"])
 def test_every_drawn_station_can_begin_its_trials(make, task, randomisation):
-    options = {"model": "station", "randomisation": randomisation, "noise": False}
+    options = {"model": "station", "randomisation": randomisation}
     env = make(task, **options, pressure_kpa=[275.0, 575.0])
     starts, forces = [], []
     for _ in range(40):

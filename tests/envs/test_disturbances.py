@@ -29,7 +29,7 @@ def disturbed(env: PMAEnv, seed: int, volts: float) -> tuple[np.ndarray, np.ndar
 
 
 def test_events_come_with_the_step_after_their_time(make):
-    env = make(disturbances=BOTH, noise=False)
+    env = make(disturbances=BOTH)
     rest = env.nominal_plant.regulator_voltage(300e3)
     rows, states = disturbed(env, 4, 3.0)
     events, gain = env.events, env.station.model.parameters["regulator_line"].gain
@@ -51,7 +51,7 @@ def test_events_come_with_the_step_after_their_time(make):
         assert settled == pytest.approx(300.0 + 1e-3 * size, abs=0.1)
 
 
-@pytest.mark.parametrize("task", ["displacement", "rotation", "isotonic", "displacement_sine"])
+@pytest.mark.parametrize("task", ["displacement", "rotation", "isotonic"])
 def test_sizes_and_times_are_as_promised(task):
     env = PMAEnv(task, disturbances=BOTH)
     times, signs, lengths = [], [], []
@@ -80,7 +80,7 @@ def test_a_hand_moves_the_slide_by_its_force_over_the_stiffness():
     """At rest under a held load a force of 50 N moves the muscle by what its stiffness allows."""
     stiff = {"coulomb_friction.static_n": 0.0, "coulomb_friction.dynamic_n": 0.0}
     env = PMAEnv(model=load_model("serres2008").replace(stiff), disturbances="hand_push",
-                 pressure_kpa=400.0, noise=False)  # fmt: skip
+                 pressure_kpa=400.0)  # fmt: skip
     for seed in range(20):
         env.reset(seed=seed)
         if env.events.pulse_forces[0] > 0 and env.events.pulse_times[0] > 1.2:
@@ -112,7 +112,7 @@ def test_without_disturbances_nothing_is_there(make):
 
 def test_an_episode_before_its_first_event_is_undisturbed(make):
     """The hand's memory costs the station nothing but rounding while nobody pulls."""
-    quiet, loud = make(noise=False), make(noise=False, disturbances=BOTH)
+    quiet, loud = make(), make(disturbances=BOTH)
     seed = next(s for s in range(50) if _first_event(loud, s) > 0.6)
     quiet.reset(seed=seed)
     loud.reset(seed=seed)
@@ -144,7 +144,7 @@ def test_controllers_are_told_the_station_without_the_hand(make):
 
 def test_the_plant_goes_on_from_the_condition_as_the_environment_does(make):
     """What an oracle may do: the pulse is in the memory, the jump in the voltage heard."""
-    env = make(disturbances=BOTH, noise=False)
+    env = make(disturbances=BOTH)
     env.reset(seed=4)
     while env.disturbance[1] == 0.0:
         env.step(env.action(3.0))

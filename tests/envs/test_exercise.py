@@ -43,13 +43,13 @@ def held(env: PMAEnv, seconds: float = 100.0) -> list[dict]:
     return infos
 
 
-@pytest.mark.parametrize("name", EXERCISES)
-@pytest.mark.parametrize("model", ["station", "serres2008"])
+@pytest.mark.parametrize(
+    ("model", "name"),
+    [*(("station", name) for name in EXERCISES), ("serres2008", "isotonic_exercise")],
+)
 def test_nothing_moves_before_the_operator_reacts_to_the_cue(name, model):
     # A unit step of the pressure would move the joint; a balance does not.
-    env = PMAEnv(
-        name, model=model, noise=False, operator=EXACT._replace(reaction=1.0, stiffness=20.0)
-    )
+    env = PMAEnv(name, model=model, operator=EXACT._replace(reaction=1.0, stiffness=20.0))
     _, info = env.reset(seed=3)
     start = env.task.exercise.start_moment
     assert info["moment_nm"] == pytest.approx(start, abs=1e-9) == info["operator_nm"]
@@ -63,7 +63,7 @@ def test_nothing_moves_before_the_operator_reacts_to_the_cue(name, model):
 
 @pytest.mark.parametrize("pressure_kpa", [275.0, 575.0])
 def test_who_gives_what_the_device_takes_turns_the_joint_as_he_means_to(pressure_kpa):
-    env = PMAEnv("isokinetic_exercise", noise=False, operator=EXACT, pressure_kpa=pressure_kpa)
+    env = PMAEnv("isokinetic_exercise", operator=EXACT, pressure_kpa=pressure_kpa)
     env.reset(seed=0)
     infos = held(env)
     # At rest near 90 deg: 17 N of hysteresis, once at its start on the branch of filling and once
@@ -91,7 +91,7 @@ def test_who_gives_what_the_device_takes_turns_the_joint_as_he_means_to(pressure
 def test_half_the_effort_gives_half_the_moment():
     moments = []
     for effort in (0.5, 1.0):
-        env = PMAEnv("isokinetic_exercise", noise=False, operator=EXACT._replace(effort=effort))
+        env = PMAEnv("isokinetic_exercise", operator=EXACT._replace(effort=effort))
         env.reset(seed=0, options={"pressure_kpa": 300})
         moments.append([info["operator_nm"] for info in held(env, 9.0)])
     np.testing.assert_allclose(moments[0], 0.5 * np.array(moments[1]), rtol=1e-12)
@@ -99,7 +99,7 @@ def test_half_the_effort_gives_half_the_moment():
 
 @pytest.mark.parametrize("name", EXERCISES)
 def test_the_compiled_operator_is_the_plain_one(name):
-    env = PMAEnv(name, control_rate_hz=125.0)
+    env = PMAEnv(name)
     env.reset(seed=8)
     operator, exercise = env.operator, env.task.exercise
     plan = exercise.prescription
@@ -149,16 +149,14 @@ def test_nobody_pushes_the_leg_beyond_straight():
 
 
 def test_the_weak_do_not_come_up():
-    env = PMAEnv("isokinetic_exercise", operator=EXACT._replace(strength=60.0), noise=False)
+    env = PMAEnv("isokinetic_exercise", operator=EXACT._replace(strength=60.0))
     env.reset(seed=0, options={"pressure_kpa": 450})
     assert held(env, 9.0)[-1]["rotation_deg"] < 85.0
 
 
 def test_who_tires_gives_less_where_it_is_all_that_he_can():
     fresh, tired = (
-        PMAEnv(
-            "isokinetic_exercise", operator=EXACT._replace(strength=80.0, fatigue=rate), noise=False
-        )
+        PMAEnv("isokinetic_exercise", operator=EXACT._replace(strength=80.0, fatigue=rate))
         for rate in (0.0, 2.0 / 60.0)
     )
     last = []
@@ -189,9 +187,8 @@ def test_a_heavier_leg_swings_more_slowly():
     assert crossings(4.0) / crossings(1.0) == pytest.approx(2.0, rel=0.06)
 
 
-@pytest.mark.parametrize("name", ["isotonic_exercise", "profile_exercise"])
-def test_the_excess_is_the_moment_less_what_is_prescribed(name):
-    env = PMAEnv(name, control_rate_hz=96.0, noise=False)
+def test_the_excess_is_the_moment_less_what_is_prescribed():
+    env = PMAEnv("profile_exercise", control_rate_hz=96.0, noise=False)
     env.reset(seed=2)
     infos = held(env, 6.0)
     plan = env.task.exercise.prescription
@@ -230,8 +227,7 @@ def test_scores_are_those_of_the_course(name):
     assert last["pace_rmse_deg"] == pytest.approx(pace, rel=1e-9)
 
 
-@pytest.mark.parametrize("name", EXERCISES)
-@pytest.mark.parametrize("threads", [1, 2])
+@pytest.mark.parametrize(("name", "threads"), [*zip(EXERCISES, (1, 2, 2), strict=True)])
 def test_many_are_as_one(name, threads):
     envs = PMAVectorEnv(19, name, threads=threads, randomisation="varied", history=2)
     together, _ = envs.reset(seed=40)
@@ -248,8 +244,8 @@ def test_many_are_as_one(name, threads):
     envs.close()
 
 
-@pytest.mark.parametrize("name", ["isokinetic_exercise", "profile_exercise"])
-def test_threads_of_a_device_play_the_same_operators(name):
+def test_threads_of_a_device_play_the_same_operators():
+    name = "profile_exercise"
     task, options = EXERCISES[name], Options(control_rate_hz=50.0)
     made = DeviceEngine(task, options, 5, "double", CpuDevice())
     envs = PMAVectorEnv(5, name, control_rate_hz=50.0, autoreset_mode="SameStep")
@@ -324,7 +320,7 @@ def test_what_is_not_safe_ends_an_episode():
 
 
 def test_the_observation_of_a_prescription_is_of_the_moment():
-    env = PMAEnv("profile_exercise", noise=False, operator="typical")
+    env = PMAEnv("profile_exercise", operator="typical")
     env.reset(seed=4)
     assert "prescribed moment at the measured angle" in env.table.describe()
     volts = env.regulator_voltage

@@ -37,8 +37,8 @@ def test_registered_specs_have_the_steps_of_the_default_options(name):
 
 
 @pytest.mark.parametrize("options", [
-    {"control_rate_hz": 20.0}, {"control_rate_hz": 300.0}, {"task": "rotation"},
-    {"task": "triangle_high", "control_rate_hz": 10}, {"task": "displacement_steps_3"},
+    {"control_rate_hz": 10.0}, {"control_rate_hz": 200.0}, {"task": "rotation"},
+    {"task": "triangle_high"}, {"task": "displacement_steps_3"},
 ])  # fmt: skip
 def test_the_spec_has_the_true_steps_and_no_episode_is_cut(options):
     env = gym.make(DISPLACEMENT, **options)
@@ -53,8 +53,8 @@ def test_the_spec_has_the_true_steps_and_no_episode_is_cut(options):
 
 @pytest.mark.parametrize("task", EVERY_TASK)
 def test_every_task_has_its_steps_in_the_spec(task):
-    env = gym.make(DISPLACEMENT, task=task, control_rate_hz=50.0)
-    assert env.spec.max_episode_steps == named_task(task).steps(50.0)
+    env = gym.make(DISPLACEMENT, task=task)
+    assert env.spec.max_episode_steps == named_task(task).steps(100.0)
 
 
 def remade(spec: EnvSpec, how: str) -> EnvSpec:
@@ -62,12 +62,12 @@ def remade(spec: EnvSpec, how: str) -> EnvSpec:
 
 
 @pytest.mark.parametrize("how", ["memory", "json"])
-@pytest.mark.parametrize("first", [{}, {"max_episode_steps": 7}, {"control_rate_hz": 40.0}])
+@pytest.mark.parametrize("first", [{}, {"max_episode_steps": 7}, {"control_rate_hz": 20.0}])
 @pytest.mark.parametrize(
     ("then", "wanted"), [({}, None), ({"max_episode_steps": 9}, 9), ({"max_episode_steps": -1}, 0)]
 )
 def test_environments_are_made_anew_from_their_specs(how, first, then, wanted):
-    env = gym.make(DISPLACEMENT, **({"control_rate_hz": 20.0} | MADE | first))
+    env = gym.make(DISPLACEMENT, **({"control_rate_hz": 10.0} | MADE | first))
     whole = named_task("displacement").steps(env.unwrapped.options.control_rate_hz)
     if wanted is None:
         wanted = first.get("max_episode_steps", whole)
@@ -80,7 +80,7 @@ def test_environments_are_made_anew_from_their_specs(how, first, then, wanted):
 
 @pytest.mark.parametrize("how", ["memory", "json"])
 def test_other_options_of_a_remade_spec_have_their_own_steps(how):
-    for spec in (gym.spec(DISPLACEMENT), gym.make(DISPLACEMENT, control_rate_hz=20).spec):
+    for spec in (gym.spec(DISPLACEMENT), gym.make(DISPLACEMENT, control_rate_hz=10).spec):
         env = gym.make(remade(spec, how), control_rate_hz=200.0)
         assert run(env)[0] == 1002 == env.spec.max_episode_steps
     limited = gym.make(DISPLACEMENT, max_episode_steps=7).spec
@@ -94,7 +94,7 @@ def test_a_number_that_is_asked_for_counts_though_it_is_the_registered_one():
 
 def test_wrappers_and_checkers_find_what_they_look_for():
     assert TimeAwareObservation(gym.make(DISPLACEMENT)).max_timesteps == 501
-    assert TimeAwareObservation(gym.make(DISPLACEMENT, control_rate_hz=20)).max_timesteps == 101
+    assert TimeAwareObservation(gym.make(DISPLACEMENT, control_rate_hz=10)).max_timesteps == 51
     for options in ({}, {"max_episode_steps": 5}, {"disable_env_checker": False}):
         env = gym.make(DISPLACEMENT, **(MADE | options))
         check_env(env.unwrapped)
@@ -146,9 +146,9 @@ def test_after_a_shortened_episode_a_reset_is_needed():
 
 
 def test_a_number_beyond_the_task_changes_nothing():
-    assert run(PMAEnv("displacement", control_rate_hz=20.0, max_episode_steps=10**9))[0] == 101
-    env = gym.make(DISPLACEMENT, control_rate_hz=20.0, max_episode_steps=10**9)
-    assert run(env)[0] == 101 == env.spec.max_episode_steps
+    assert run(PMAEnv("displacement", control_rate_hz=10.0, max_episode_steps=10**9))[0] == 51
+    env = gym.make(DISPLACEMENT, control_rate_hz=10.0, max_episode_steps=10**9)
+    assert run(env)[0] == 51 == env.spec.max_episode_steps
 
 
 @pytest.mark.parametrize("steps", [0, -1, -7, 2.5, True, "10", np.float64(3.0)])
@@ -214,7 +214,7 @@ def test_shortened_batches_are_as_single_environments(twins, mode):
 @pytest.mark.parametrize("mode", ["vector_entry_point", "sync", "async"])
 @pytest.mark.parametrize(
     ("options", "steps"),
-    [({}, 501), ({"max_episode_steps": 6}, 6), ({"control_rate_hz": 200.0}, 1002)],
+    [({}, 501), ({"max_episode_steps": 6}, 6), ({"control_rate_hz": 10.0}, 51)],
 )
 def test_every_kind_of_vector_has_the_true_steps_and_the_summary(mode, options, steps):
     envs = gym.make_vec(DISPLACEMENT, 2, vectorization_mode=mode, **MADE, **options)
@@ -232,7 +232,7 @@ def test_batches_are_made_anew_from_their_specs(how):
     for options, steps in (
         ({}, 501),
         ({"max_episode_steps": 6}, 6),
-        ({"control_rate_hz": 20}, 101),
+        ({"control_rate_hz": 10}, 51),
     ):
         envs = gym.make_vec(DISPLACEMENT, 2, **options)
         again = gym.make_vec(remade(envs.spec, how))

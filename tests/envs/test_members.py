@@ -55,10 +55,10 @@ def test_a_member_is_the_single_environment(task):
 
 def test_pictures_go_on_through_the_ends_of_episodes(fragile):
     options = {"model": fragile, "pressure_kpa": 300, "control_rate_hz": 10.0}
-    envs = PMAVectorEnv(3, render_mode="rgb_array", **options)
+    envs = PMAVectorEnv(3, render_mode="rgb_array", max_episode_steps=20, **options)
     envs.reset(seed=1)
     first, ended = envs.render(), 0
-    for step in range(130):
+    for step in range(50):
         *_, terminated, truncated, _ = envs.step(np.array([[1.0], [-0.9], [-0.9]], np.float32))
         ends = terminated | truncated
         frames = envs.render() if ends.any() or step % 10 == 0 else ()
@@ -134,18 +134,19 @@ def films(monkeypatch):
 def test_gymnasium_records_a_film_of_a_batch(films, tmp_path):
     if not hasattr(gym.wrappers.vector, "RecordVideo"):
         pytest.skip(f"Gymnasium {gym.__version__} has no RecordVideo of batches")
-    envs = gym.make_vec("pma_gym/IsokineticDisplacement-v0", 4, control_rate_hz=10.0, **MADE)
+    made = MADE | {"control_rate_hz": 10.0, "max_episode_steps": 11}
+    envs = gym.make_vec("pma_gym/IsokineticDisplacement-v0", 4, **made)
     folder = str(tmp_path / "films")
     envs = gym.wrappers.vector.RecordVideo(
         envs, folder, episode_trigger=lambda episode: episode == 0
     )
     envs.reset(seed=1)
-    for _ in range(60):
+    for _ in range(15):
         envs.step(np.full((4, 1), -0.9, np.float32))
     envs.close()
     (film,) = films
-    # The episode's 51 steps and its first picture.
-    assert len(film.frames) == 52 and film.fps == 10
+    # The episode's 11 steps and its first picture.
+    assert len(film.frames) == 12 and film.fps == 10
     assert {frame.shape for frame in film.frames} == {(800, 1600, 3)}
 
 

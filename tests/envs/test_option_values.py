@@ -31,12 +31,12 @@ SAME = [
     ("noise", np.array(False), False),
     ("regulator_action", np.False_, False),
     ("preview", np.int64(2), 2),
-    ("preview", np.array(3, np.uint8), 3),
+    ("preview", np.array(2, np.uint8), 2),
     ("history", np.int32(1), 1),
     ("control_rate_hz", np.float32(50), 50.0),
     ("control_rate_hz", np.int64(50), 50),
     ("action_delay_s", np.float64(0.02), 0.02),
-    ("observation_delay_s", np.array(0.03), 0.03),
+    ("observation_delay_s", np.array(0.04), 0.04),
     ("tolerance", np.float64(1e-3), 1e-3),
     ("tolerance", np.array(1e-3), 1e-3),
     ("reward_scale", np.float32(0.5), 0.5),
@@ -61,11 +61,23 @@ def test_values_are_kept_plain_and_survive_json(name, value, plain):
         np.testing.assert_array_equal(other.reset(seed=4)[0], env.reset(seed=4)[0])
 
 
-@pytest.mark.parametrize(("name", "value", "plain"), SAME)
-def test_batches_take_the_same_values(name, value, plain):
-    envs = gym.make_vec(DISPLACEMENT, 2, **{"model": "serres2008", name: value})
-    assert envs.unwrapped.options == PMAEnv(**{"model": "serres2008", name: plain}).options
-    assert json.loads(envs.spec.to_json())["kwargs"][name] == plain
+def test_batches_take_the_same_values():
+    for together in (SAME, SAME[::-1]):
+        # The last of each name.
+        values = {name: value for name, value, _ in together}
+        plains = {name: plain for name, _, plain in together}
+        envs = gym.make_vec(DISPLACEMENT, 2, model="serres2008", **values)
+        assert envs.unwrapped.options == PMAEnv(model="serres2008", **plains).options
+        assert plains.items() <= json.loads(envs.spec.to_json())["kwargs"].items()
+        gym.make_vec(EnvSpec.from_json(envs.spec.to_json())).reset(seed=1)
+
+
+@pytest.mark.parametrize("value", [value for name, value, _ in SAME if name == "pressure_kpa"])
+def test_batches_take_the_same_pressures(value):
+    envs = gym.make_vec(DISPLACEMENT, 2, model="serres2008", pressure_kpa=value)
+    (plain,) = [plain for _, same, plain in SAME if same is value]
+    assert envs.unwrapped.options == PMAEnv(model="serres2008", pressure_kpa=plain).options
+    assert json.loads(envs.spec.to_json())["kwargs"]["pressure_kpa"] == plain
     gym.make_vec(EnvSpec.from_json(envs.spec.to_json())).reset(seed=1)
 
 

@@ -7,23 +7,22 @@ from pma_gym.metrics import PHASE_SAMPLES, phase_times, rmse
 from pma_gym.plant.model import shipped_models
 from pma_gym.plant.plant import Plant
 
-# A period that floats hold exactly, so that sums of it are exact too.
-EXACT_RATE = 128.0
+EVERY_MODEL = [
+    *((name, "displacement") for name in sorted(shipped_models())),
+    ("station", "rotation"),
+]
 
 
-@pytest.mark.parametrize(
-    ("model", "task"),
-    [*((name, "displacement") for name in sorted(shipped_models())), ("station", "rotation")],
-)
+@pytest.mark.parametrize(("model", "task"), EVERY_MODEL)
 def test_states_are_those_of_the_plant_under_the_held_voltages(make, task, model):
-    env = make(task, model=model, control_rate_hz=EXACT_RATE)
+    env = make(task, model=model)
     env.reset(seed=1)
     volts, states = [], [env.condition.state.copy()]
     for k in range(200):
         env.step(env.action(0.01 * k))
         volts.append(env.motor_voltage)
         states.append(env.condition.state.copy())
-    time = np.arange(201) / EXACT_RATE
+    time = np.arange(201) / 100.0
     plant = Plant(model)
     regulator = np.full(201, plant.regulator_voltage(300e3))
     rest = plant.settle(0.0, pressure=300e3)
@@ -41,7 +40,7 @@ def test_states_are_those_of_the_plant_under_the_held_voltages(make, task, model
         ("displacement", 100.0, 501),
         ("rotation", 100.0, 1501),
         ("displacement", 384.0, 1922),
-        ("rotation", 25, 376),
+        ("rotation", 20, 301),
         ("displacement", 1000.0, 5006),
     ],
 )
@@ -64,7 +63,7 @@ def test_truncated_only_at_the_end(make):
 
 
 def test_reference_and_position_are_compared_at_the_same_time(make):
-    env = make(noise=False)
+    env = make()
     env.reset(seed=0)
     for k in range(1, 101):
         *_, info = env.step(env.action(1.0))
@@ -75,11 +74,14 @@ def test_reference_and_position_are_compared_at_the_same_time(make):
         assert info["error_mm"] == pytest.approx(position - 0.05 * k, abs=1e-12)
 
 
-@pytest.mark.parametrize("task", ["displacement", "rotation"])
-def test_samples_are_the_same_at_every_control_rate(make, follow, ramp, task):
+@pytest.mark.parametrize(
+    ("task", "rates"),
+    [("displacement", (20.0, 100.0, 384.0, 1000.0)), ("rotation", (20.0, 100.0))],
+)
+def test_samples_are_the_same_at_every_control_rate(make, follow, ramp, task, rates):
     scores, paths = [], []
-    for rate in (4.0, 20.0, 100.0, 384.0, 1000.0):
-        env = make(task, control_rate_hz=rate, noise=False)
+    for rate in rates:
+        env = make(task, control_rate_hz=rate)
         # 384 Hz does not hit every step of the ramp: let it wait for the next of its instants.
         info = follow(env, lambda time: ramp(time + 1e-9))
         scores.append(info[f"rmse_{env.task.schedule.unit}"])
@@ -119,10 +121,10 @@ def test_rmse_is_that_of_the_trajectory(make, follow, ramp, task):
     assert info["ended_by"] == ""
 
 
-@pytest.mark.parametrize("steps", [1, 3, 10])
+@pytest.mark.parametrize("steps", [1, 10])
 def test_a_delayed_action_acts_so_many_whole_steps_later(make, steps):
-    prompt = make(noise=False)
-    late = make(noise=False, action_delay_s=0.01 * steps)
+    prompt = make()
+    late = make(action_delay_s=0.01 * steps)
     prompt.reset(seed=0)
     late.reset(seed=0)
     volts = [1.0 + 0.05 * k for k in range(40)]
@@ -170,13 +172,15 @@ def test_preview_holds_the_references_of_the_steps_to_come(make):
         observation, *_ = env.step(env.action(0.0))
 
 
-def test_zero_volts_keep_the_muscle_at_rest(make, model):
-    env = make("rotation", model=model, noise=False)
+@pytest.mark.parametrize(("model", "task"), EVERY_MODEL)
+def test_zero_volts_keep_the_muscle_at_rest(make, model, task):
+    env = make(task, model=model)
     _, start = env.reset(seed=0)
     truth = dict(env.truth)
     for _ in range(300):
         *_, info = env.step(env.action(0.0))
     # 0.1 nm, 0.1 nrad, and the pressure to 10 digits.
     assert env.truth == pytest.approx(truth, rel=1e-10, abs=1e-10)
-    assert info["rotation_deg"] == pytest.approx(0.0, abs=1e-6)
+    position = {"displacement": "extension_mm", "rotation": "rotation_deg"}[task]
+    assert info[position] == pytest.approx(0.0, abs=1e-6)
     assert info["pressure_kpa"] == pytest.approx(start["pressure_kpa"]) == pytest.approx(300.0)

@@ -57,10 +57,10 @@ def test_the_layer_saves_operators_from_wild_commands(tmp_path):
 
 
 def test_what_comes_of_an_episode_does_not_depend_on_how_many_there_are():
-    few = {(t.task, t.stations, t.agent): t for t in measure(42, 5, True, ThisProcess())}
+    few = {(t.task, t.stations, t.agent): t for t in measure(14, 5, True, ThisProcess())}
     # The same counts from several processes.
-    assert few == {(t.task, t.stations, t.agent): t for t in measure(42, 5, True, local(2))}
-    more = {(t.task, t.stations, t.agent): t for t in measure(84, 5, True, ThisProcess())}
+    assert few == {(t.task, t.stations, t.agent): t for t in measure(14, 5, True, local(2))}
+    more = {(t.task, t.stations, t.agent): t for t in measure(56, 5, True, ThisProcess())}
     for name, tally in few.items():
         assert more[name].peak_speed_deg_s >= tally.peak_speed_deg_s
 

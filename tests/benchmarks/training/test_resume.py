@@ -4,6 +4,7 @@ import errno
 import hashlib
 import os
 import resource
+import shutil
 import subprocess
 import sys
 
@@ -62,6 +63,32 @@ def same(one, other):
     return all(torch.equal(one[name], other[name]) for name in one)
 
 
+@pytest.fixture(scope="module")
+def kept():
+    """Trainings that several tests begin from."""
+    return {}
+
+
+@pytest.fixture
+def whole(kept, preset, tmp_path, tmp_path_factory):
+    """A folder with a copy of a finished training, its weights and its final score."""
+    if "whole" not in kept:
+        folder = tmp_path_factory.mktemp("whole")
+        done = trained(Order(preset(), seed=3), folder)
+        kept["whole"] = folder, weights(done.model), done.final
+    folder, tensors, final = kept["whole"]
+    return shutil.copytree(folder, tmp_path / "whole"), tensors, final
+
+
+@pytest.fixture
+def killed(kept, preset, monkeypatch, tmp_path, tmp_path_factory):
+    """A folder with a copy of a training that was killed after its first leg."""
+    if "killed" not in kept:
+        kept["killed"] = tmp_path_factory.mktemp("killed")
+        killed_after(1, monkeypatch, Order(preset(), seed=3), kept["killed"])
+    return shutil.copytree(kept["killed"], tmp_path / "killed")
+
+
 @pytest.mark.parametrize("algorithm", ["ppo", "sac", "td3", "tqc"])
 def test_a_killed_training_comes_to_the_same_policy(algorithm, preset, monkeypatch, tmp_path):
     order = Order(preset(algorithm), seed=3)
@@ -81,16 +108,15 @@ def test_a_killed_training_comes_to_the_same_policy(algorithm, preset, monkeypat
     assert same(ours, theirs)
 
 
-def test_a_finished_training_run_again_trains_nothing(preset, monkeypatch, tmp_path):
-    order = Order(preset(), seed=3)
-    first = trained(order, tmp_path)
+def test_a_finished_training_run_again_trains_nothing(whole, preset, monkeypatch):
+    folder, tensors, final = whole
 
     def leg(*_):
         raise AssertionError("there is nothing to train")
 
     monkeypatch.setattr(run, "_leg", leg)
-    again = trained(order, tmp_path)
-    assert same(weights(first.model), weights(again.model)) and first.final == again.final
+    again = trained(Order(preset(), seed=3), folder)
+    assert same(tensors, weights(again.model)) and final == again.final
 
 
 def test_the_same_seed_gives_the_same_policy_and_another_one_another(preset, tmp_path):
@@ -140,12 +166,11 @@ def test_another_process_gives_the_same_policy(preset, tmp_path):
 # -- refused ---------------------------------------------------------------------------------------
 
 
-def test_another_order_in_the_folder_is_refused(preset, monkeypatch, tmp_path):
-    killed_after(1, monkeypatch, Order(preset(), seed=3), tmp_path)
+def test_another_order_in_the_folder_is_refused(killed, preset):
     with pytest.raises(CheckpointError, match=r"another training: seed was 3, is 4; give another"):
-        trained(Order(preset(), seed=4), tmp_path)
+        trained(Order(preset(), seed=4), killed)
     with pytest.raises(CheckpointError, match=r"steps was 960, is 1920"):
-        trained(Order(preset(steps=1920), seed=3), tmp_path)
+        trained(Order(preset(steps=1920), seed=3), killed)
 
 
 DAMAGE = {
@@ -158,13 +183,12 @@ DAMAGE = {
 
 
 @pytest.mark.parametrize("damage", DAMAGE)
-def test_a_damaged_checkpoint_is_named_and_the_one_before_serves(damage, preset, capsys, tmp_path):
-    order = Order(preset(), seed=3)
-    whole = trained(order, tmp_path)
+def test_a_damaged_checkpoint_is_named_and_the_one_before_serves(damage, whole, preset, capsys):
+    folder, tensors, _ = whole
     name, harm = DAMAGE[damage]
-    last = tmp_path / "checkpoints" / "000002"
+    last = folder / "checkpoints" / "000002"
     (last / name).write_bytes(harm((last / name).read_bytes()))
-    assert same(weights(whole.model), weights(trained(order, tmp_path).model))
+    assert same(tensors, weights(trained(Order(preset(), seed=3), folder).model))
     said = [line for line in capsys.readouterr().err.splitlines() if line.startswith("warning: ")]
     assert len(said) == 1 and "000002 is damaged" in said[0]
 
@@ -184,19 +208,17 @@ def _full(*_, **__):
 
 
 @pytest.mark.parametrize("what", ["save_file", "json"])
-def test_a_full_disk_leaves_the_last_checkpoint(what, preset, monkeypatch, tmp_path):
+def test_a_full_disk_leaves_the_last_checkpoint(what, whole, killed, preset, monkeypatch):
     order = Order(preset(), seed=3)
-    whole = trained(order, tmp_path / "whole")
-    killed_after(1, monkeypatch, order, tmp_path / "full")
     with monkeypatch.context() as patched:
         if what == "json":
             patched.setattr("pathlib.Path.write_text", _full)
         else:
             patched.setattr(checkpoint, what, _full)
         with pytest.raises(CheckpointError, match=r"No space left.*leg 1 stays in .*make room"):
-            trained(order, tmp_path / "full")
-    assert [p.name for p in (tmp_path / "full" / "checkpoints").iterdir()] == ["000001"]
-    assert same(weights(whole.model), weights(trained(order, tmp_path / "full").model))
+            trained(order, killed)
+    assert [p.name for p in (killed / "checkpoints").iterdir()] == ["000001"]
+    assert same(whole[1], weights(trained(order, killed).model))
 
 
 def test_a_file_that_may_not_grow_is_told(preset, tmp_path):

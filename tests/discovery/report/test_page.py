@@ -31,6 +31,14 @@ class Tags(HTMLParser):
         assert self.open.pop() == tag
 
 
+@pytest.fixture(scope="module", autouse=True)
+def small_pictures():
+    """Pictures of a third of the size, which are drawn in half the time."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("pma_gym.pages.figures.DPI", 50)
+        yield
+
+
 @pytest.fixture(scope="module")
 def page_of(diagnoses):
     """The page of a verdict's diagnosis; its pictures take most of a second, so it is kept."""
