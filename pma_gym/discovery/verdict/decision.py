@@ -74,7 +74,7 @@ def verdict_of(
     if chosen:
         undecided = any(
             is_ambiguous(one.name, [rival.candidate.name for rival in rivals if rival.equal])
-            for one, rivals in zip(chosen, findings.rivals, strict=True)
+            for one, rivals in zip(chosen, findings.rivals, strict=False)
         )
         return "undecidable" if undecided or not _confirmed(findings) else "effect"
     if coarse:
