@@ -100,7 +100,7 @@ def test_every_step_of_a_run_is_known_beforehand(search):
         left(step, done, total)
         said.append((step, left.seconds()))
 
-    trials = laboratory("hysteresis" if search else "parameters")[0]
+    trials = laboratory("hysteresis", 2, 32.0)[0] if search else laboratory("parameters")[0]
     options = {"propose": False} if search else {}
     (diagnose if search else refit)(trials, STATION, progress=progress, **options)
     first = said[0][0]

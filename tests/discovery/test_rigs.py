@@ -146,6 +146,10 @@ def test_nothing_is_claimed_of_a_driven_slide_whose_parameters_are_off():
     assert viscous == pytest.approx(SLIDE["viscous"], rel=0.03)
 
 
+def twelve_pulls():
+    return driven_slide(12.0, lanes=12, seconds=0.4, rate=100)
+
+
 def fifteen_pulls():
     return driven_slide(12.0, lanes=15, seconds=0.4, rate=100)
 
@@ -155,7 +159,14 @@ def one_long_drive():
 
 
 @pytest.mark.parametrize(
-    "log", [fifteen_pulls, pytest.param(one_long_drive, marks=pytest.mark.campaign)]
+    "log",
+    [
+        twelve_pulls,
+        *(
+            pytest.param(each, marks=pytest.mark.campaign)
+            for each in (fifteen_pulls, one_long_drive)
+        ),
+    ],
 )
 def test_dry_friction_is_found_in_a_driven_slide_and_is_not_taken_for_viscous(log):
     diagnosis = diagnose(log(), DRIVEN, propose=False)

@@ -234,10 +234,10 @@ def _policies(_, document):
 
 
 READERS = {
-    "model": (_models, MODEL_TABLES[0], 4),
+    "model": (_models, MODEL_TABLES[0], 6),
     "dataset.toml": (_descriptions, DATASETS[0], 1),
     "suite": (_suites, min(SUITE_TABLES, key=lambda table: len(str(table))), 5),
-    "preset": (_presets, PRESET_TABLES[0], 5),
+    "preset": (_presets, PRESET_TABLES[0], 9),
     "policy": (_policies, POLICY_TABLES[0], 7),
 }
 

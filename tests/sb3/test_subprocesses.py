@@ -20,7 +20,9 @@ def make() -> PMAEnv:
     return PMAEnv("displacement", model="serres2008", randomisation="varied", pressure_kpa=300.0)
 
 
-@pytest.mark.parametrize("start_method", ["forkserver", "spawn"])
+@pytest.mark.parametrize(
+    "start_method", [pytest.param("forkserver", marks=pytest.mark.campaign), "spawn"]
+)
 def test_get_attr_of_what_workers_hold(start_method):
     envs = SubprocVecEnv([make, make], start_method=start_method)
     try:

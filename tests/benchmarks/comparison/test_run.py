@@ -106,10 +106,8 @@ def test_a_run_that_is_interrupted_and_killed_ends_as_if_it_had_not_been(suite, 
     with (out / JOURNAL).open("ab") as journal:
         journal.write(b'{"suite": "small", "versi')
     before = sum(1 for _ in read_rows(out / JOURNAL))
-    command += ["--jobs", "1"]
-    finished = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=120)
-    assert finished.returncode == 0, finished.stdout + finished.stderr
-    assert f"{before} cases are done" in finished.stdout
+    code, words = run(suite, f"pid,{slow}", out)
+    assert code == 0 and f"{before} cases are done" in words
     # No case ran twice.
     assert sum(1 for _ in read_rows(out / JOURNAL)) == 12
     whole = tmp_path / "whole"
