@@ -28,12 +28,6 @@ def amended(tmp_path_factory):
     return path
 
 
-def test_jobs_change_no_byte():
-    trials = laboratory("hysteresis")[0]
-    two = diagnose(trials, STATION, jobs=2, propose=False)
-    assert two.text() == diagnosed("hysteresis").text()
-
-
 def test_the_seed_changes_chance_alone():
     trials = laboratory("parameters")[0]
     one, other = (diagnose(trials, STATION, seed=seed, propose=False) for seed in (0, 1))

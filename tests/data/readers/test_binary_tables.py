@@ -291,11 +291,11 @@ def test_texts_that_refer_to_each_other_are_refused(tmp_path, parquet):
 
 def test_a_wide_file_is_refused_at_once(tmp_path, monkeypatch):
     path = tmp_path / "a.csv"
-    names = ["time_s", "motor_voltage_v", *[f"c{k}" for k in range(100_000)]]
+    names = ["time_s", "motor_voltage_v", *[f"c{k}" for k in range(20_000)]]
     path.write_text(",".join(names) + "\n" + ",".join("1" * len(names)) + "\n")
-    assert "limit of 1000 columns a table: it has 100002" in refused(path)
+    assert "limit of 1000 columns a table: it has 20002" in refused(path)
     monkeypatch.setenv("PMA_GYM_MAX_COLUMNS", "200000")
-    with pytest.warns(TrialWarning, match="unknown columns are ignored: 'c0'.* 99960 more"):
+    with pytest.warns(TrialWarning, match="unknown columns are ignored: 'c0'.* 19960 more"):
         assert len(read_trial(path)) == 1
 
 

@@ -95,12 +95,17 @@ def test_a_lab_without_rest_or_repeat_states_its_tolerance():
     assert stated == pytest.approx(1e3 * campaign.sensor.rms, rel=1e-5)
 
 
+@pytest.fixture(scope="module")
+def slide_model():
+    """Text of the model of a drawn slide."""
+    return draw_driven(np.random.default_rng(2), "slide", "own", (5, 2)).texts([])["model.toml"]
+
+
 @pytest.mark.parametrize("names", [OURS, METRES, GERMAN])
-def test_a_lab_s_own_names_and_units_are_read_as_ours(names, tmp_path):
+def test_a_lab_s_own_names_and_units_are_read_as_ours(names, slide_model, tmp_path):
     force, position = np.array([0.0, 1.25, -2.5]), np.array([0.00045, 12.3456, -7.0])
     tables = [{"load_command_n": (force, 4), "contraction_mm": (position, 5)}]
-    model = draw_driven(np.random.default_rng(2), "slide", "own", (5, 2)).texts([])["model.toml"]
-    for name, text in files.folder(50.0, tables, {}, model, {}, names).items():
+    for name, text in files.folder(50.0, tables, {}, slide_model, {}, names).items():
         (tmp_path / name).write_text(text, "utf-8")
     trial = read_dataset(tmp_path).trials[0].trial
     assert trial.time == pytest.approx([0.0, 0.02, 0.04])

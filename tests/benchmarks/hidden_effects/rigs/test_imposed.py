@@ -119,7 +119,7 @@ MEASURED = (
 )
 
 
-@pytest.mark.parametrize("seed", [0, 1])
+@pytest.mark.parametrize("seed", [0, pytest.param(1, marks=pytest.mark.campaign)])
 @pytest.mark.parametrize("name", MEASURED)
 def test_what_a_testing_machine_can_show_is_hidden_at_any_size(name, seed):
     rng = np.random.default_rng(seed)
