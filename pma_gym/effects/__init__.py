@@ -74,6 +74,7 @@ from pma_gym.effects.residual_law import (
     RESIDUAL_LOAD,
 )
 from pma_gym.effects.sensors.potentiometer_backlash import POTENTIOMETER_BACKLASH
+from pma_gym.effects.sensors.sensor_delay import SENSOR_DELAYS
 from pma_gym.effects.sensors.sensor_errors import (
     FORCE_SENSOR_ERROR,
     LOAD_CELL_ERROR,
@@ -180,6 +181,7 @@ CATALOGUE: dict[str, Effect] = {
         BACKLASH,
         FORCE_SENSOR,
         FORCE_SENSOR_ERROR,
+        *SENSOR_DELAYS,
     )
 }
 """Effects by name, in the order in which plants sum them."""

@@ -39,20 +39,20 @@ class RegulatorDelay(NamedTuple):
     delay: Annotated[float, Quantity("ms", 0.1, 500, "proportional regulators: 10-30 ms", usual=20)]
 
 
-def ladder(asked, memory, delay):
+def ladder(asked, memory, delay, elements=ELEMENTS):
     """Rates of the ladder's states: T e_i m_i' = m_(i-1) - m_(i+1).
 
-    For the first state, m_0 is the command minus m_1. The last state has no successor and is the
-    output. At rest the even states equal the command and the odd ones are 0.
+    For the first state, m_0 is the command minus m_1. The last state has no successor. At rest the
+    even states equal the command and the odd ones are 0.
     """
     own = 1.0 / delay
     following = (*memory[1:], 0.0)
     before = (asked, *memory[:-1])
     sources = [
         own * (1.0 / element) * (b - a)
-        for element, b, a in zip(ELEMENTS, before, following, strict=True)
+        for element, b, a in zip(elements, before, following, strict=True)
     ]
-    decays = (own * (1.0 / ELEMENTS[0]), *(0.0 * own for _ in ELEMENTS[1:]))
+    decays = (own * (1.0 / elements[0]), *(0.0 * own for _ in elements[1:]))
     return tuple(zip(sources, decays, strict=True))
 
 

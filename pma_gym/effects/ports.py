@@ -130,9 +130,12 @@ STATION_PORTS: dict[str, Port] = {
 }
 """Ports of a station: for each the number of effects, the use of their results, and its signals."""
 
+SENSOR, SENSOR_DELAY = "sensor:", "sensor_delay:"
+"""Prefixes, before an output's name, of the ports of a sensor's errors and lag and of its delay."""
+
 SENSOR_PORTS: dict[str, Port] = {
-    f"sensor:{output}": Port("reading on top of the truth, added", signals=_SENSOR, absent=0.0)
-    for output in (sensor.port.removeprefix("sensor:") for sensor in SENSORS)
+    f"{SENSOR}{output}": Port("reading on top of the truth, added", signals=_SENSOR, absent=0.0)
+    for output in (sensor.port.removeprefix(SENSOR) for sensor in SENSORS)
 }
 """Ports of the sensors, the same for every rig."""
 
@@ -145,3 +148,13 @@ OPEN_PORTS: dict[str, Port] = {
 def example(signal: str) -> float:
     """Typical value (SI) of a signal."""
     return _RANGES.get(signal, 200.0)
+
+
+def measured_output(port: str) -> str:
+    """Output of a rig that a sensor's port belongs to; "" for another port.
+
+    >>> measured_output("sensor_delay:angle"), measured_output("drive_delay")
+    ('angle', '')
+    """
+    begun = (each for each in (SENSOR, SENSOR_DELAY) if port.startswith(each))
+    return port.removeprefix(next(begun, port))

@@ -61,6 +61,19 @@ def meet(states: Array, held: Array, logged: Logged, levels: Array, further: int
         states[:-further] += share[:, None, None] * moved
 
 
+def put_zero(positions: Array, logged: Logged) -> None:
+    """Put simulated positions on the zero of a late sensor, which read the first one earlier.
+
+    Args:
+        positions: what the sensor holds (SI), shape (tried, rows); changed in place.
+        logged: what was measured; the position is its first signal.
+    """
+    counts = logged.counts[0]
+    if counts.any():
+        off = (logged.measured[0] - positions) @ counts / counts.sum()
+        positions += off[:, None]
+
+
 def _start(logged: Logged) -> tuple[float, float]:
     speed = logged.channel("angular speed", "speed")
     if not logged.measures[0] and speed is not None and logged.measures[speed]:

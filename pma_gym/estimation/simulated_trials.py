@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pma_gym.data.trial import Trial
+from pma_gym.effects.ports import SENSOR_DELAY
 from pma_gym.estimation import initial_states
 from pma_gym.estimation.free_parameters import free_parameters
 from pma_gym.estimation.logged import Logged
@@ -70,6 +71,7 @@ class SimulatedTrials:
     ) -> None:
         check_interpolation(interpolation)
         self.plant, self.threads = Plant(model, tolerance), threads
+        self._ports = {effect.port for effect in model.effects.values()}
         self.interpolation: Interpolation = interpolation
         self.free = free_parameters(self.plant.model, free)
         indices = [parameter.place for parameter in self.free]
@@ -199,6 +201,9 @@ class SimulatedTrials:
         every = np.concatenate([vectors, *([vectors[:1]] * further)])
         held = np.stack(self._held(space, zeros, every), axis=1)
         initial_states.meet(space, held, logged, self._levels, further)
+        position = self.plant.model.rig.signals[0]
+        if position.has_free_zero and f"{SENSOR_DELAY}{position.name}" in self._ports:
+            initial_states.put_zero(space[:tried, :, self.plant.sensor_columns[0]], logged)
         return space[:tried]
 
     @property

@@ -14,6 +14,7 @@ from pma_gym.codegen.trace import trace
 from pma_gym.effects import Effect
 from pma_gym.effects.arithmetic import positive
 from pma_gym.effects.effect import Parameters, signals
+from pma_gym.effects.ports import SENSOR_DELAY
 from pma_gym.integrator.equations import Breakpoint, Equations, Interpolation, RateIndependentState
 
 LAG_SHARE = 5.0
@@ -166,8 +167,8 @@ class PlantEquations(Equations):
                 scale = (scales or {}).get(effect.port, effect.memory_scale)
                 self._add_memory(effect, effect.rate, scale)
 
-    def _add_memory(self, effect: Effect, law: Callable, scale: float) -> None:
-        pairs = self.call(effect, law)
+    def _add_memory(self, effect: Effect, law: Callable, scale: float, **other: Value) -> None:
+        pairs = self.call(effect, law, **other)
         rates = pairs if effect.memories > 1 else (pairs,)
         for name, rate in zip(effect.memory_names, rates, strict=True):
             self.add_decaying(name, rate, scale)
@@ -182,7 +183,8 @@ class PlantEquations(Equations):
     def add_sensors(self, scales: Mapping[str, float]) -> None:
         """Add the lag of every sensor, with the error scales of their outputs.
 
-        A lag's input is the output plus the errors at the same port; their states are added too.
+        A lag's input is the output plus the errors at the same port, late by the sensor's delay;
+        their states are added too.
         """
         for effect in self.effects.values():
             if effect.port.startswith("sensor:") and effect.rate and not effect.law:
@@ -193,8 +195,18 @@ class PlantEquations(Equations):
                     for error in self.at(effect.port)
                     if error.law
                 ]
-                rate = self.call(effect, effect.rate, signal=sum(errors, truth))
-                self.add_decaying(f"lag_{effect.name}", rate, LAG_SHARE * scales[output])
+                scale = LAG_SHARE * scales[output]
+                received = self._delayed(output, sum(errors, truth), scale)
+                rate = self.call(effect, effect.rate, signal=received)
+                self.add_decaying(f"lag_{effect.name}", rate, scale)
                 for error in self.at(effect.port):
                     if error.law and error.rate:
                         self._add_memory(error, error.rate, error.memory_scale)
+
+    def _delayed(self, output: str, signal: Value, scale: float) -> Value:
+        """Return an output after the delay of its sensor, whose states are added."""
+        for effect in self.at(f"{SENSOR_DELAY}{output}"):
+            assert effect.law is not None and effect.rate is not None
+            self._add_memory(effect, effect.rate, scale, signal=signal)
+            signal = self.call(effect, effect.law, signal=signal)
+        return signal

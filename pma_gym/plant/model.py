@@ -15,7 +15,7 @@ import numpy as np
 from pma_gym.documents import DocumentError, read_toml
 from pma_gym.effects import CATALOGUE, Effect
 from pma_gym.effects.effect import Parameters, Value
-from pma_gym.effects.ports import Port
+from pma_gym.effects.ports import SENSOR_DELAY, Port, measured_output
 from pma_gym.effects.renamed_effects import with_present_names
 from pma_gym.limits import LimitError
 from pma_gym.paths import is_path, missing_file
@@ -339,12 +339,13 @@ def _check_ports(model: Model) -> None:
         raise ModelError(f"plant must be one of {', '.join(RIGS)}, got {model.plant!r}")
     rig = model.rig
     for name, effect in model.effects.items():
-        known = effect.port == "part" or effect.port.startswith("sensor:")
+        known = effect.port == "part" or measured_output(effect.port)
         if not known and effect.port not in rig.ports:
             raise ModelError(
                 f"[{name}] acts at port {effect.port}, which a {rig.name} does not have; "
                 f"its ports: {', '.join(rig.ports)}"
             )
+        _check_sensor(model, effect)
         if name in rig.refused_effects:
             raise ModelError(f"a {rig.name} cannot have [{name}]: {rig.refused_effects[name]}")
     for part in rig.parts:
@@ -355,6 +356,16 @@ def _check_ports(model: Model) -> None:
             raise ModelError(f"a {rig.name} needs [{part}]; {where}")
     for name, port in rig.ports.items():
         _check_port(model, name, port)
+
+
+def _check_sensor(model: Model, effect: Effect) -> None:
+    sensor = effect.name.removesuffix("_delay")
+    if effect.port.startswith(SENSOR_DELAY) and sensor not in model.parameters:
+        raise ModelError(
+            f"[{effect.name}] delays the readings of [{sensor}], which the model does not have; "
+            f"add [{sensor}] with {', '.join(CATALOGUE[sensor].names_at_the_door())}, or leave "
+            f"[{effect.name}] out"
+        )
 
 
 def _check_port(model: Model, name: str, port: Port) -> None:

@@ -26,7 +26,7 @@ DRY = {
 }
 
 
-def logs(count=3, seconds=1.0, rate=200.0):
+def logs(count=2, seconds=1.0, rate=150.0):
     """Speeds of a rubbing slide under sums of sines, begun in motion, each measured twice."""
     generator, trials = np.random.default_rng(3), []
     rubbing = MODEL.replace(TRUE).with_effects({"coulomb_friction": DRY})

@@ -35,6 +35,8 @@ EVERY = (
     "drive_lag",
     "drive_delay",
     "regulator_delay",
+    "lvdt_delay",
+    "load_cell_delay",
     "bearing_friction",
     "potentiometer_backlash",
     "filling",

@@ -173,7 +173,9 @@ def catalogue_name(kind: str, name: str) -> str:
 
 
 GROUPS: tuple[frozenset[str], ...] = (
-    frozenset({"drive_delay", "drive_lag", "lvdt_lag", "encoder_lag"}),
+    frozenset(
+        {"drive_delay", "drive_lag", "lvdt_lag", "lvdt_delay", "encoder_lag", "encoder_delay"}
+    ),
     frozenset({"coulomb_friction", "load_dependent_friction", "position_dependent_friction"}),
     frozenset({"joint_friction", "joint_load_friction"}),
     frozenset({"contact_friction", "pressure_friction"}),

@@ -23,7 +23,7 @@ from pma_gym.discovery.report.unknown_text import unknown_sentence
 from pma_gym.discovery.result.candidate import ADDED
 from pma_gym.discovery.selection.backward_elimination import ODDS
 from pma_gym.discovery.verdict.adequacy import OPEN
-from pma_gym.discovery.verdict.decision import MOST_RIVALS, MOVED_CHANGE, UNDETECTABLE_SHARE
+from pma_gym.discovery.verdict.decision import MOVED_CHANGE, UNDETECTABLE_SHARE, is_ambiguous
 from pma_gym.discovery.verdict.findings import Findings
 from pma_gym.discovery.verdict.residual_fraction import ResidualFraction
 from pma_gym.discovery.verdict.unknown import Reason
@@ -73,8 +73,8 @@ def sentence(diagnosis: Diagnosis, unknown: Reason | None = None) -> str:
         return unknown_sentence(diagnosis, unknown, trials)
     if diagnosis.candidates and diagnosis.candidates[0].why == ADDED:
         equal = [each.name for each in diagnosis.candidates if "as well as" in each.why]
-        if len(equal) <= MOST_RIVALS:
-            added = [each.name for each in diagnosis.candidates if each.why == ADDED]
+        added = [each.name for each in diagnosis.candidates if each.why == ADDED]
+        if not is_ambiguous(added[0], equal):
             instead = f" (or {effect_names(equal, 'or')})" if equal else ""
             return (
                 f"Model {name} misses something, {effect_names(added)}{instead} most likely, but "

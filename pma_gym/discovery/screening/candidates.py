@@ -18,6 +18,7 @@ from pma_gym.discovery.fitting.free_parameters import unit, values
 from pma_gym.discovery.screening.usual_sizes import Sizes, sizes
 from pma_gym.effects import CATALOGUE, Effect
 from pma_gym.effects.effect import signals
+from pma_gym.effects.ports import measured_output
 from pma_gym.plant import sensors
 from pma_gym.plant.model import Model, ModelError
 from pma_gym.units import Quantity
@@ -99,9 +100,10 @@ def _lacking(
     counted = "repeat" in effect.quantities
     if counted and (orders is None or len(set(orders)) < 2):
         return None
-    if effect.port not in model.rig.ports and not effect.port.startswith("sensor:"):
+    output = measured_output(effect.port)
+    if effect.port not in model.rig.ports and not output:
         return None
-    if effect.port.startswith("sensor:") and not _has_sensor(model, effect.port):
+    if output and not _has_sensor(model, output):
         return None
     needed = model.rig.needed_ports.get(effect.port)
     if needed and all(each.port != needed for each in model.effects.values()):
@@ -250,9 +252,11 @@ def _slow_sensors(model: Model) -> Iterator[CandidateEffect]:
         )
 
 
-def _has_sensor(model: Model, port: str) -> bool:
+def _has_sensor(model: Model, output: str) -> bool:
     return any(
-        model.effects[name].port == port for name in sensors.SENSORS if name in model.effects
+        measured_output(model.effects[name].port) == output
+        for name in sensors.SENSORS
+        if name in model.effects
     )
 
 

@@ -1,6 +1,6 @@
 """The verdict: which of the five a diagnosis comes to."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
@@ -11,7 +11,7 @@ from pma_gym.discovery.verdict.findings import Findings
 from pma_gym.discovery.verdict.unknown import Reason, gate
 
 MOST_RIVALS = 2
-"""Most others that an effect may be confused with and still be named: groups of three."""
+"""Most other phenomena that an effect may be confused with and still be named: groups of three."""
 
 MUCH_EXPLAINED = 0.1
 """Share of chi-square that an effect could explain, from which on its not passing the gate means
@@ -32,6 +32,22 @@ def suspicious(findings: Findings) -> bool:
         return False
     best = findings.scores[0]
     return best.change >= LEAST_CHANGE and best.gain > MUCH_EXPLAINED * findings.refitted.chi_square
+
+
+def is_ambiguous(name: str, rivals: Iterable[str]) -> bool:
+    """Whether so many effects explain the data as well as one that none is named.
+
+    The delay and the lag of one channel, a drive or a sensor, are one phenomenon. They differ by
+    the square of the time only, and both say which channel is late and by how much.
+
+    >>> is_ambiguous("encoder_delay", ["encoder_lag", "drive_delay", "drive_lag"])
+    False
+    """
+    return len({_phenomenon(each) for each in rivals} - {_phenomenon(name)}) > MOST_RIVALS
+
+
+def _phenomenon(name: str) -> str:
+    return name.removesuffix("_delay").removesuffix("_lag")
 
 
 def verdict_of(
@@ -57,7 +73,8 @@ def verdict_of(
         return "undecidable"
     if chosen:
         undecided = any(
-            sum(rival.equal for rival in rivals) > MOST_RIVALS for rivals in findings.rivals
+            is_ambiguous(one.name, [rival.candidate.name for rival in rivals if rival.equal])
+            for one, rivals in zip(chosen, findings.rivals, strict=False)
         )
         return "undecidable" if undecided or not _confirmed(findings) else "effect"
     if coarse:

@@ -160,17 +160,23 @@ class EquilibriumProblem:
         """Put states where their rates vanish, which are linear in them."""
         for name in names:
             self[name] = 0.0
-        still = self._rates(names)
-        slopes = np.empty((len(still), len(names), len(names)))
-        for i, name in enumerate(names):
-            self[name] = 1.0
-            slopes[:, :, i] = self._rates(names) - still
-            self[name] = 0.0
+        slopes = self.slopes(names)
         # From there again: the differences above have lost digits.
         for _ in range(4):
             change = np.linalg.solve(slopes, self._rates(names)[..., None])[..., 0]
             for i, name in enumerate(names):
                 self[name] -= change[:, i]
+
+    def slopes(self, names: Sequence[str]) -> np.ndarray:
+        """Slopes of the rates of states over the same states, shape (n, rates, states)."""
+        still = self._rates(names)
+        slopes = np.empty((len(still), len(names), len(names)))
+        for i, name in enumerate(names):
+            before = self[name].copy()
+            self[name] = before + 1.0
+            slopes[:, :, i] = self._rates(names) - still
+            self[name] = before
+        return slopes
 
     def _rates(self, names: Sequence[str]) -> np.ndarray:
         return np.stack([self.rate(name) for name in names], axis=1)

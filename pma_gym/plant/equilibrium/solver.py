@@ -2,10 +2,12 @@
 
 import numpy as np
 
+from pma_gym.effects.ports import measured_output
 from pma_gym.plant.compiled_model import CompiledModel
 from pma_gym.plant.condition import Condition, check_commands
 from pma_gym.plant.equilibrium.force_balance import balances
 from pma_gym.plant.equilibrium.problem import EquilibriumProblem, effect_parameters, put_memories
+from pma_gym.plant.equilibrium.sensor_start import start_sensors
 from pma_gym.plant.model import Model
 
 
@@ -63,7 +65,7 @@ def hangs_by_itself(model: Model) -> bool:
     dynamics.
     """
     effects = model.effects.values()
-    sensed = any(effect.port.startswith("sensor:") and effect.law for effect in effects)
+    sensed = any(measured_output(effect.port) and effect.law for effect in effects)
     delayed = any(effect.port == "regulator_delay" for effect in effects)
     return model.rig.balances_loads and not sensed and not delayed
 
@@ -136,12 +138,7 @@ def _solve(
     for port in ("drive_delay", "drive_lag"):
         problem.relax_memory(port)
     plant.model.rig.solve_equilibrium(problem)
-    for name in plant.states:
-        if name.startswith("lag_"):
-            problem.relax(name)
-    for lag, rate in plant.model.rig.moving_lags.items():
-        if lag in plant.states:
-            problem.follow(lag, problem[rate])
+    start_sensors(problem, plant.model.rig)
     return problem
 
 

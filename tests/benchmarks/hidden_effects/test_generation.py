@@ -273,7 +273,10 @@ def test_trials_stay_within_what_the_rig_bears():
 
 
 def test_groups_are_small_and_known():
-    assert all(2 <= len(names) <= 3 and names <= set(KINDS) for names in GROUPS)
+    delays = {f"{sensor}_delay" for sensor in SENSORS}
+    for names in GROUPS:
+        assert len(names) >= 2 and len(names - delays) <= 3 and names <= {*KINDS, *delays}
+        assert all(name.replace("_delay", "_lag") in names for name in names & delays)
     assert group("filling") == {"filling"}
 
 

@@ -7,6 +7,7 @@ from pma_gym.discovery.fitting.candidate_effect import bounds
 from pma_gym.discovery.screening.candidates import FAR, candidate_effects
 from pma_gym.discovery.workflow import diagnose
 from pma_gym.effects import CATALOGUE, user_effects
+from pma_gym.effects.ports import measured_output
 from pma_gym.effects.user_effects import load_effects
 from tests.discovery.laboratory import LEVELS, OFF, STATION, fit_problem, laboratory, measured
 
@@ -52,7 +53,10 @@ def test_every_effect_that_can_be_absent_is_a_candidate_or_replaces_another_law(
     for name, effect in CATALOGUE.items():
         if effect.replaces:
             assert name not in effects
-        elif effect.port.removeprefix("sensor:") not in (*STATION.rig.ports, *STATION.rig.outputs):
+        elif (measured_output(effect.port) or effect.port) not in (
+            *STATION.rig.ports,
+            *STATION.rig.outputs,
+        ):
             # It acts where another rig has a port.
             assert name not in effects
         elif effect.law and effect.neutral is not None and name not in STATION.parameters:

@@ -61,12 +61,13 @@ def words(late: dict[str, float]) -> list[str]:
             said.append(
                 f"{names} are late by the same {mean:.3g} ms after the model's simulation: either "
                 "the logger stamps its readings later than its commands, or the drive is late; "
-                "check the logger before you believe a delay"
+                "check the logger before you believe a delay of the drive"
             )
         elif len(together) == 1 and lag >= ALONE_S and (direct or len(late) == 1):
             said.append(
-                f"{names} alone is late, by {mean:.3g} ms after the model's simulation: check the "
-                "filter and the channel of its sensor"
+                f"{names} alone is late, by {mean:.3g} ms after the model's simulation, whose "
+                "parameters move this figure: its sensor lags, or another clock stamps its "
+                "readings; a diagnosis names either as that sensor's lag or delay"
             )
     return said
 

@@ -219,8 +219,11 @@ def test_a_sensor_that_is_late_alone_is_named(tmp_path):
         {**e, "load_n": np.interp(e["time_s"] - 0.03, e["time_s"], e["load_n"])}
         for e in logs(truth=GIVEN)
     ]
-    (words,) = checked(write(tmp_path / "lab", late)).checked
-    assert words.startswith("load_n alone is late, by 30 ms")
+    folder = write(tmp_path / "lab", late)
+    (words,) = checked(folder).checked
+    assert words.startswith("load_n alone is late, by 30 ms") and words.endswith("lag or delay")
+    named = GIVEN.with_effects({"load_cell_delay": {"share": 1.0, "delay_ms": 30.0}})
+    assert check_dataset(read_dataset(folder), named).checked == ()
 
 
 def test_commands_that_no_model_follows_are_left_to_the_fit(tmp_path):
