@@ -28,6 +28,9 @@ WANDER, MOST_TURNS = 4e-4, 24
 """How far a line's frequency is off in a trial, as a share of it: mains wander by 20 mHz, as an
 assumption of ours. And how many half turns of that a trial gives it at most."""
 
+LEAKS = 2
+"""Half turns beyond those that a line's wandering may have."""
+
 SLOW_SHARE = 0.1
 """Share of a command's variance below its slowest excited frequency."""
 
@@ -142,6 +145,8 @@ def line_columns(hertz: float, time: Array) -> list[Array]:
     """
     duration = max(float(time[-1] - time[0]), 1e-300)
     turns = min(int(2.0 * WANDER * hertz * duration), MOST_TURNS)
+    # What is no whole number of half turns leaks into the next ones.
+    turns += LEAKS if turns else 0
     slow = [np.cos(np.pi * k * (time - time[0]) / duration) for k in range(turns + 1)]
     angle = 2.0 * np.pi * hertz * time
     return [each * wave for each in slow for wave in (np.cos(angle), np.sin(angle))]
