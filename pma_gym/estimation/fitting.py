@@ -34,6 +34,9 @@ Array = NDArray[np.float64]
 SHOWN = 0.3
 """Change of the measurements by a finite difference, in their standard deviations."""
 
+TINY = 1e4
+"""A hundredth of a range over a value, from which on the range is no scale for it."""
+
 FIRST_MOVE, LEAST_MOVE, MOST_MOVE = 1e-3, 1e-6, 2e-2
 """First, least and largest such move, as a share of the parameter's value, or of its bounds' width
 where it is near 0."""
@@ -241,6 +244,9 @@ class LevenbergMarquardt:
         width = 1e-2 * (self.upper - self.lower)
         # A limit may be anything up to one that is never reached; its own size is its scale.
         boundless = (self.lower > 0.0) & (width > BOUNDLESS * np.abs(values))
+        # What a crane may have says nothing of a watch.
+        far = (values != 0.0) & (width > TINY * np.abs(values))
+        width = np.where(far, np.maximum(np.abs(values) * np.sqrt(TINY), width / TINY), width)
         return np.where(boundless, np.abs(values), np.maximum(np.abs(values), width))
 
     def _held(self) -> NDArray[np.bool_]:

@@ -29,6 +29,13 @@ FIRST_REST_S = 0.1
 LEAST_REST = 12
 """Fewest readings of a segment."""
 
+FEWEST_SEGMENTS = 3
+"""Fewest segments that tell which of them are at rest."""
+
+MOVING, QUIETEST = 6.0, 3.0
+"""Spread of a segment in which something moves, over that of quiet ones; and of the quiet ones over
+the quietest, at most."""
+
 ENOUGH = 120
 """Fewest readings at rest, over all trials, from which a noise level is taken."""
 
@@ -117,7 +124,27 @@ def rest_readings(trials: Sequence[Logged], channel: int) -> list[Array]:
                 at = np.arange(len(values), dtype=float)
                 line = np.polyfit(at[known], values[known], 1)
                 stretches.append(values - np.polyval(line, at))
-    return stretches
+    return _at_rest(stretches)
+
+
+def _at_rest(stretches: list[Array]) -> list[Array]:
+    """Less those in which something moves: a rig that swings on while its drive is constant.
+
+    They spread far more than the quieter half of the readings, and than neighbours do.
+    """
+    if len(stretches) < FEWEST_SEGMENTS:
+        return stretches
+    spreads = np.array([float(np.nanstd(part)) for part in stretches])
+    counts = np.array([int(np.isfinite(part).sum()) for part in stretches])
+    order = np.argsort(spreads)
+    half = order[: 1 + int(np.searchsorted(np.cumsum(counts[order]), 0.5 * counts.sum()))]
+    quiet = np.sqrt(np.average(spreads[half] ** 2, weights=counts[half]))
+    # Through half of the readings, were most of them in motion, a quiet one would not show.
+    quiet = min(quiet, QUIETEST * float(spreads.min()) or quiet)
+    most = MOVING * max(quiet, level_of_neighbours(stretches))
+    return [
+        part for part, spread in zip(stretches, spreads.tolist(), strict=True) if spread <= most
+    ]
 
 
 def level_at_rest(segments: Sequence[Array]) -> float | None:
