@@ -23,6 +23,7 @@ from pma_gym.discovery.preparation.mains_lines import with_lines
 from pma_gym.discovery.preparation.noise import white_noise
 from pma_gym.discovery.preparation.prepared_trials import prepared
 from pma_gym.discovery.preparation.quantisation import is_coarse
+from pma_gym.discovery.preparation.recorded_bandwidth import with_recorded_bandwidth
 from pma_gym.discovery.preparation.splits import fold_of_rows
 from pma_gym.discovery.screening.candidates import candidate_effects
 from pma_gym.discovery.screening.residuals import reestimated_noise, simulated_less_measured
@@ -129,8 +130,9 @@ class _Work:
     def run(self, search: bool) -> Diagnosis:
         dataset, given = self._input()
         named, words = prepared(dataset.trials, given)
-        words = (*(dataset.checked or ()), *words)
         trials = [each.trial for each in named]
+        given, slower = with_recorded_bandwidth(given, trials)
+        words = (*(dataset.checked or ()), *words, *slower)
         journal = Journal(self.folder, trials, given, f"diagnosis 3 seed {self.seed}")
         logged = [Logged.of(given, i, trial) for i, trial in enumerate(trials)]
         floors = self._timed("noise", lambda: initial_floors(given, logged, named, dataset.sensors))
@@ -178,7 +180,7 @@ class _Work:
         )
         findings = _without_worse(findings)
         findings = self._timed("confirmation", lambda: self._confirmed(findings))
-        findings = self._timed("adequacy", lambda: self._judged(findings, logged))
+        findings = self._timed("adequacy", lambda: self._adequate(findings, logged))
         diagnosis = self._timed(
             "report", lambda: diagnosis_from_findings(findings, self._tell, self.propose)
         )
@@ -288,6 +290,19 @@ class _Work:
         folds = fold_of_rows(problem.trials, problem.files)
         judged = adequacy(logged, unseen_, fitted, floors, folds, self.seed)
         return replace(findings, adequacy=judged)
+
+    def _adequate(self, findings: Findings, logged: Sequence[Logged]) -> Findings:
+        """Judged; with all parameters free where the fewest leave structure that they would not.
+
+        Odds weigh a drift that a few repeats tell badly: it may stand for a parameter's offset.
+        """
+        judged = self._judged(findings, logged)
+        if judged.adequacy.structure is None or findings.elimination is None:
+            return judged
+        if findings.discarded is not None:
+            return judged
+        free = self._judged(self._confirmed(replace(findings, elimination=None)), logged)
+        return judged if free.adequacy.structure is not None else free
 
     def _timed(self, step: str, work: Callable):  # noqa: ANN202
         begun = time.perf_counter()

@@ -14,6 +14,10 @@ from scipy.linalg import solveh_banded
 Array = NDArray[np.float64]
 
 
+ENOUGH_ROWS = 8
+"""Fewest rows of a record's end that tell how it would go on."""
+
+
 def smoothed(time: Array, values: Array, bandwidth: float) -> tuple[Array, Array, Array]:
     """Smooth a record, and return its first and second derivative.
 
@@ -24,6 +28,30 @@ def smoothed(time: Array, values: Array, bandwidth: float) -> tuple[Array, Array
     Returns:
         The motion and its first and second derivative (SI), shape (n,) each.
     """
+    rows = len(time)
+    time, values = _continued(time, values, bandwidth)
+    parts = _spline(time, values, bandwidth)
+    return parts[0][:rows], parts[1][:rows], parts[2][:rows]
+
+
+def _continued(time: Array, values: Array, bandwidth: float) -> tuple[Array, Array]:
+    """A record with a period of the bandwidth more, along the parabola of its last period.
+
+    Without it the spline would end straight, whatever the record does there.
+    """
+    period = 1.0 / bandwidth
+    since = time - time[-1]
+    last = since >= -period
+    if last.sum() < ENOUGH_ROWS:
+        return time, values
+    step = float(np.median(np.diff(since[last])))
+    more = step * np.arange(1, int(np.ceil(period / step)) + 1)
+    parabola = np.polynomial.Polynomial.fit(since[last], values[last], 2)
+    return np.append(time, time[-1] + more), np.append(values, parabola(more))
+
+
+def _spline(time: Array, values: Array, bandwidth: float) -> tuple[Array, Array, Array]:
+    """The smoothing spline of a record and its derivatives, as `smoothed`."""
     rows = len(time)
     if rows < 3:
         rate = np.zeros(rows) if rows < 2 else np.full(2, np.diff(values) / np.diff(time))

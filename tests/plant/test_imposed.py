@@ -57,6 +57,14 @@ def test_a_steady_motion_passes_uneven_times_as_it_is():
     np.testing.assert_allclose(curvature, 0.0, atol=1e-8)
 
 
+def test_a_record_that_ends_in_motion_ends_with_its_speed():
+    time = np.arange(0.0, 3.2, 0.005)
+    for phase in (0.0, 0.9, 2.0):
+        _, rate, _ = smoothed(time, 0.02 * np.sin(2.0 * time + phase), 10.0)
+        wanted = 0.04 * np.cos(2.0 * time + phase)
+        assert np.abs(rate - wanted)[-40:].max() < 5e-3 * 0.04
+
+
 def test_damping_feels_the_velocity_of_the_motion():
     damping = {"intercept_n_s_per_mm": 1.0, "slope_n_s_per_mm_per_kpa": 0.0}
     expected = -1000.0 * 0.02 * np.pi * np.sin(2.0 * np.pi * TIME)

@@ -6,7 +6,8 @@ from typing import Any, Protocol, Self
 import numpy as np
 
 from benchmarks.hidden_effects.rigs.driven_campaign import draw_driven
-from benchmarks.hidden_effects.rigs.laws import CoulombFriction, HiddenEffect
+from benchmarks.hidden_effects.rigs.imposed_campaign import draw_tested
+from benchmarks.hidden_effects.rigs.laws import CoulombFriction, HiddenEffect, PressureFriction
 from benchmarks.hidden_effects.rigs.offers import KNOWN, OFFERS, OUTSIDE, catalogue_name, group
 from benchmarks.hidden_effects.rigs.rig import log_uniform
 
@@ -51,7 +52,7 @@ class Campaign(Protocol):
         ...
 
 
-DRAWN = {"slide": draw_driven, "joint": draw_driven}
+DRAWN = {"slide": draw_driven, "joint": draw_driven, "imposed": draw_tested}
 """How campaigns of each kind of rig are drawn."""
 
 
@@ -128,7 +129,10 @@ def _described(campaign: Campaign, effect: HiddenEffect) -> dict[str, Any]:
 def expected(kind: str, effect: HiddenEffect) -> dict[str, float]:
     """Values in file units, by the catalogue's parameter, that describe a hidden effect."""
     if isinstance(effect, CoulombFriction):
-        return {"dynamic_n_m" if kind == "joint" else "dynamic_n": effect.size}
+        level = {"joint": "dynamic_n_m", "slide": "dynamic_n", "imposed": "force_n"}[kind]
+        return {level: effect.size}
+    if isinstance(effect, PressureFriction):
+        return {"slope_n_per_kpa": 1e3 * effect.size * effect.slope}
     return {
         "drive_delay": {"delay_ms": 1e3 * effect.size},
         "drive_lag": {"time_constant_ms": 1e3 * effect.size},

@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from benchmarks.hidden_effects.rigs.imposed_rig import ImposedRig
 from benchmarks.hidden_effects.rigs.lab_names import OURS, LabNames
 from benchmarks.hidden_effects.rigs.rig import Rig
 
@@ -131,6 +132,38 @@ offset_deg = {_number(math.degrees(rig.gravity_angle))}
 [joint_spring]
 stiffness_n_m_per_rad = {_number(rig.stiffness)}
 rest_deg = 0.0
+"""
+    return text
+
+
+FASTER = 3.0
+"""Bandwidth of what a log records of a motion, over that of the machine that makes it."""
+
+
+def imposed(rig: ImposedRig) -> str:
+    """Text of the model of a part on a testing machine, whose cell is freed of its inertia."""
+    text = f"""schema = 1
+name = "lab"
+title = "What the lab believes"
+plant = "imposed"
+
+[imposed_motion]
+bandwidth_hz = {_number(FASTER * rig.bandwidth)}
+
+[symmetric_damping]
+intercept_n_s_per_mm = {_number(rig.damping / 1e3)}
+slope_n_s_per_mm_per_kpa = 0.0
+"""
+    if rig.area:
+        text += f"""
+[piston_force]
+area_mm2 = {_number(1e6 * rig.area)}
+"""
+    if rig.stiffness:
+        text += f"""
+[spring]
+stiffness_n_per_mm = {_number(rig.stiffness / 1e3)}
+rest_mm = 0.0
 """
     return text
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from scipy.ndimage import gaussian_filter1d
 
 from benchmarks.hidden_effects.rigs import files
 from benchmarks.hidden_effects.rigs.excitation import Reference, draw_lengths, draw_reference
@@ -19,7 +20,10 @@ SIMULATORS = {"own": imposed_force.simulate, "MuJoCo": mujoco_force.simulate}
 """What computes the force."""
 
 MOTION = "contraction_command_mm"
-"""Column of an imposed motion."""
+"""Column of an imposed motion, positive against q: pressure pushes the rod out."""
+
+FORCE = "force_n"
+"""Column of what the load cell reads."""
 
 
 @dataclass(frozen=True)
@@ -73,6 +77,13 @@ class ImposedCampaign:
         """Columns of each file."""
         return [self._table(effects, i) for i in range(len(self.motions))]
 
+    def texts(self, effects: Sequence[HiddenEffect]) -> dict[str, str]:
+        """Texts of the lab's folder by name."""
+        # Without a repeat nothing but the load cell's data sheet says how much is noise.
+        stated = {} if self.repeats else {FORCE: self.cell.rms}
+        model = files.imposed(self.believed)
+        return files.folder(self.rig.rate, self.tables(effects), self.repeats, model, stated)
+
     def truth(self) -> dict[str, Any]:
         """What nobody must read before the diagnosis is made, besides the effects."""
         return {
@@ -81,21 +92,23 @@ class ImposedCampaign:
             "believed": vars(self.believed),
             "seconds": [len(each.q) / self.rig.rate for each in self.motions],
             "sensor": {"kind": self.cell.kind, "step": self.cell.step},
-            "noise": {"load_n": self.cell.rms},
+            "noise": {FORCE: self.cell.rms},
             "noise_kinds": self.cell.noise.names,
         }
 
     def _table(self, effects: Sequence[HiddenEffect], i: int) -> files.Table:
-        force, rate = self.force(effects, i), self.rig.rate
+        rate = self.rig.rate
+        # Dynamic testers take the inertia of what moves beyond the cell off, by an accelerometer.
+        force = self.force(effects, i) - self.rig.mass * self.motions[i].a
         rng = np.random.default_rng((*self.seed, i, 7))
         read = force + self.cell.noise.draw(rng, np.arange(len(force)) / rate)
         read = self.cell.step * np.round(read / self.cell.step)
-        motion = 1e3 * self.motions[i].q
+        motion = -1e3 * self.motions[i].q
         table = {MOTION: (motion, files.digits(1e-6 * 1e3 * self.rig.travel))}
         if self.rig.area:
             kpa = np.full(len(force), self.rig.pressures[i] / 1e3)
-            table["pressure_kpa"] = (kpa, 1)
-        return table | {"load_n": (read, files.digits(self.cell.step))}
+            table["pressure_command_kpa"] = (kpa, 1)
+        return table | {FORCE: (read, files.digits(self.cell.step))}
 
 
 def draw_tested(
@@ -108,8 +121,8 @@ def draw_tested(
     lengths = draw_lengths(rng, rig.rate, rig.frequency)
     lengths = [lengths[i % len(lengths)] for i in range(count)]
     motions = [
-        draw_reference(rng, rig.travel, rig.frequency, rig.rate, round(each * rig.rate))
-        for each in lengths
+        _turned(rig, draw_reference(rng, rig.travel, rig.frequency, rig.rate, rows))
+        for rows in (round(each * rig.rate) for each in lengths)
     ]
     repeats = {}
     if rng.random() < 0.8:
@@ -124,3 +137,15 @@ def draw_tested(
     white = rig.peak_force * log_uniform(rng, 3e-4, 3e-2)
     cell = Sensor("load cell", white * rng.uniform(0.1, 1.0), draw_noise(rng, white))
     return ImposedCampaign(rig, believed, cell, motions, repeats, simulator, seed)
+
+
+def _turned(rig: ImposedRig, motion: Reference) -> Reference:
+    """A motion as a machine of finite bandwidth makes it, from rest: its speed never jumps.
+
+    It ends a little earlier, since what would come after its end is not known.
+    """
+    rows = rig.rate / (2.0 * np.pi * rig.bandwidth)
+    kept = slice(0, len(motion.q) - int(4.0 * rows + 1.0))
+    return Reference(
+        *(gaussian_filter1d(x, rows, mode="nearest")[kept] for x in vars(motion).values())
+    )

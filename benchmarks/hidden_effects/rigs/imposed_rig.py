@@ -8,6 +8,9 @@ import numpy as np
 
 from benchmarks.hidden_effects.rigs.rig import RATES, log_uniform
 
+SLOWEST_HZ = 5.0
+"""Bandwidth of the slowest machines."""
+
 
 @dataclass(frozen=True)
 class ImposedRig:
@@ -38,6 +41,11 @@ class ImposedRig:
     rate: float
 
     gravity: ClassVar[float] = 0.0
+
+    @property
+    def bandwidth(self) -> float:
+        """Of the machine (Hz): it turns within a tenth of a second, or of its fastest period."""
+        return min(max(SLOWEST_HZ, 8.0 * self.frequency), self.rate / 10.0)
 
     @property
     def peak_speed(self) -> float:

@@ -134,6 +134,14 @@ KNOWN: dict[str, tuple[str, ...]] = {
         "drive_delay",
         "drive_lag",
     ),
+    "imposed": (
+        "coulomb_friction",
+        "pressure_dependent_friction",
+        "hardening_spring",
+        "quadratic_drag",
+        "directional_damping",
+        "cogging",
+    ),
 }
 """What the catalogue has for each kind of rig."""
 
@@ -149,9 +157,19 @@ JOINT_NAMES: dict[str, str] = {
 """What the catalogue calls effects of a joint, where a slide's has another name there."""
 
 
+IMPOSED_NAMES: dict[str, str] = {
+    "coulomb_friction": "contact_friction",
+    "pressure_dependent_friction": "pressure_friction",
+}
+"""The same of a part on a testing machine."""
+
+NAMES: dict[str, dict[str, str]] = {"joint": JOINT_NAMES, "imposed": IMPOSED_NAMES}
+"""By kind of rig."""
+
+
 def catalogue_name(kind: str, name: str) -> str:
     """Name that the catalogue has for an effect of a kind of rig."""
-    return JOINT_NAMES.get(name, name) if kind == "joint" else name
+    return NAMES.get(kind, {}).get(name, name)
 
 
 GROUPS: tuple[frozenset[str], ...] = (
@@ -160,6 +178,7 @@ GROUPS: tuple[frozenset[str], ...] = (
     ),
     frozenset({"coulomb_friction", "load_dependent_friction", "position_dependent_friction"}),
     frozenset({"joint_friction", "joint_load_friction"}),
+    frozenset({"contact_friction", "pressure_friction"}),
     frozenset({"joint_weight", "joint_spring", "joint_hardening_spring"}),
 )
 """Effects that usual logs cannot always tell apart; fixed before any held-out seed is run."""

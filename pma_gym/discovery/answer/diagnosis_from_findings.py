@@ -44,6 +44,7 @@ from pma_gym.discovery.verdict.unknown import (
     widest_scatter,
 )
 from pma_gym.discovery.verdict.worsened import worsened
+from pma_gym.effects import CATALOGUE
 
 Progress = Callable[[str, int, int], None]
 
@@ -131,10 +132,13 @@ def _decision(findings: Findings, left: ResidualFraction) -> _Decision:
     """Decide the verdict; `left` is what the proposed model leaves of what is slow."""
     coarse = coarse_sensors(findings.floors, _misfits(findings))
     laws = shapeless_laws(findings, left)
+    through = findings.given.rig.modifying_ports
     not_detectable = tuple(
         score.candidate.name
         for score in findings.scores
-        if score.resolvable is None or score.resolvable > 1.0
+        # What only changes another effect shows with that one alone.
+        if (score.resolvable is None or score.resolvable > 1.0)
+        and CATALOGUE[score.candidate.effect].port not in through
     )
     parameters = (
         moved_parameters(findings, findings.selection.fit)

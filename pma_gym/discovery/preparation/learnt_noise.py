@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from pma_gym.data.datasets.dataset import NamedTrial
-from pma_gym.discovery.preparation.acceptance_floors import difference, repeats
+from pma_gym.discovery.preparation.acceptance_floors import repeats
 from pma_gym.discovery.preparation.noise import Whitening, autoregression, rest_readings
-from pma_gym.discovery.preparation.nuisance_projection import drift_cosines
+from pma_gym.discovery.preparation.nuisance_projection import drift_cosines, line_columns
 from pma_gym.estimation.logged import Logged
 
 Array = NDArray[np.float64]
@@ -33,6 +33,13 @@ and too small a size leaves a drift that looks like the rig's."""
 
 LEAST_DRIFT = 0.15
 """Drift (rms) in standard deviations of the noise, below which it counts as none."""
+
+MOST_MISSING = 0.1
+"""Share of readings that may be missing in repeats, outliers that were set aside say."""
+
+MOST_WAVES, WAVE_CHANCE = 6, 1e-4
+"""Most half waves of a drift in a trial, and the chance that noise has one that commands do not
+leave free."""
 
 NEAR = 16
 """Neighbours above a drift's cosines that tell how much noise without drift has there."""
@@ -57,23 +64,28 @@ def learnt_noise(
     shares = [each.share for each in drifts if np.isfinite(each.share)]
     usual = float(np.sqrt(np.mean(np.square(shares)))) if shares else 0.0
     for channel, before in enumerate(noise):
-        after = _coloured(before, logged, pairs, channel)
+        after = _coloured(before, logged, pairs, channel, drifts[channel].waves)
         if surely and np.isfinite(drifts[channel].share):
             # One pair of repeats tells a size badly; drifts of one rig's sensors are alike.
             share = UNSURE * max(usual, drifts[channel].share)
             if share > LEAST_DRIFT:
-                after = replace(after, drift=share * before.level)
+                waves = drifts[channel].waves
+                after = replace(after, drift=share * before.level, waves=waves)
         learnt.append(after)
     return tuple(learnt)
 
 
 def _coloured(
-    before: Whitening, logged: Sequence[Logged], pairs: Sequence[tuple[int, int]], channel: int
+    before: Whitening,
+    logged: Sequence[Logged],
+    pairs: Sequence[tuple[int, int]],
+    channel: int,
+    waves: int,
 ) -> Whitening:
     """With the colour of what repeats differ by, or else of rest segments."""
-    parts = [_noise_of_pair(logged, i, j, channel, before.lines) for i, j in pairs]
+    parts = [_noise_of_pair(logged, i, j, channel, before.lines, waves) for i, j in pairs]
     parts = [part for part in parts if part.size]
-    if sum(map(len, parts)) < ENOUGH_ALIKE:
+    if sum(int(np.isfinite(part).sum()) for part in parts) < ENOUGH_ALIKE:
         parts = rest_readings(logged, channel)
         if before.lines or sum(int(np.isfinite(part).sum()) for part in parts) < ENOUGH_ALIKE:
             return before
@@ -82,33 +94,46 @@ def _coloured(
 
 @dataclass(frozen=True)
 class _Drift:
-    """Of one signal: its share of the noise (rms), NaN if unknown, and how likely by chance."""
+    """Of one signal.
+
+    Attributes:
+        share: of the noise (rms), NaN if unknown.
+        chance: how likely by chance.
+        waves: half waves of it in a trial, beyond those that commands leave free; else 0.
+    """
 
     share: float
     chance: float
+    waves: int = 0
 
 
 def _drift(logged: Sequence[Logged], pairs: Sequence[tuple[int, int]], channel: int) -> _Drift:
     """Drift of a signal: how much repeats differ by slow cosines, beyond what noise does."""
-    power, total, count, beside = 0.0, 0.0, 0, []
+    squares, total, least = [], 0.0, MOST_WAVES
     for i, j in pairs:
-        apart = difference(logged[i], logged[j], channel) / np.sqrt(2.0)
-        if apart.size != len(logged[i].time):
+        apart = _apart(logged[i], logged[j], channel)
+        if not apart.size:
             continue
-        slow = len(drift_cosines(logged[i]))
-        waves = _cosines(len(apart), slow + NEAR)
-        sizes = waves @ (apart - apart.mean())
-        power += float(np.sum(sizes[:slow] ** 2))
-        beside.append(float(np.mean(sizes[slow:] ** 2)))
+        at, there = np.arange(len(apart)), np.isfinite(apart)
+        apart = np.interp(at, at[there], apart[there])
+        squares.append((_cosines(len(apart), MOST_WAVES + NEAR) @ (apart - apart.mean())) ** 2)
         total += len(apart)
-        count += slow
-    if not count:
+        least = min(least, len(drift_cosines(logged[i])))
+    if not squares:
         return _Drift(np.nan, 1.0)
-    level = float(np.mean(beside))
+    # The median, for what is no whole number of half waves leaks into the neighbours.
+    beside = np.array(squares)[:, MOST_WAVES:]
+    level = float(np.median(beside) / chi2.median(1))
     if level <= 0.0:
         return _Drift(np.nan, 1.0)
-    share = np.sqrt(max(power - count * level, 0.0) / total / level)
-    return _Drift(float(share), float(chi2.sf(power / level, count)))
+    powers = np.sum(squares, axis=0)[:MOST_WAVES] / level
+    single = chi2.sf(powers, len(squares)) * MOST_WAVES
+    waves = max([k + 1 for k in range(least, MOST_WAVES) if single[k] < WAVE_CHANCE], default=0)
+    most = max(least, waves)
+    slow = float(powers[:most].sum())
+    count = most * len(squares)
+    share = np.sqrt(max(slow - count, 0.0) / total)
+    return _Drift(float(share), float(chi2.sf(slow, count)), waves)
 
 
 def _cosines(rows: int, count: int) -> Array:
@@ -118,22 +143,48 @@ def _cosines(rows: int, count: int) -> Array:
 
 
 def _noise_of_pair(
-    logged: Sequence[Logged], i: int, j: int, channel: int, lines: Sequence[float]
+    logged: Sequence[Logged],
+    i: int,
+    j: int,
+    channel: int,
+    lines: Sequence[float],
+    waves: int,
 ) -> Array:
     """What two repeats differ by over root 2 (SI), less what follows state and command.
 
-    Less lines and what drifts, too. Empty where their times differ, or readings are missing.
+    Less lines and what drifts, too; NaN where a reading is missing. Empty where `_apart` is.
     """
-    apart = difference(logged[i], logged[j], channel) / np.sqrt(2.0)
     one, other = logged[i], logged[j]
-    if apart.size != len(one.time):
-        return np.empty(0)
+    apart = _apart(one, other, channel)
+    if not apart.size:
+        return apart
     columns = [np.ones(len(one.time)), one.motor, one.regulator]
     columns += [np.sign(np.gradient(each)) for each in (one.motor, one.regulator)]
-    columns += [row for row in 0.5 * (one.measured + other.measured) if np.ptp(row) > 0.0]
-    columns += drift_cosines(one)
+    there = np.isfinite(apart)
+    read = one.counts * other.counts > 0.0
+    for row, known in zip(0.5 * (one.measured + other.measured), read, strict=True):
+        # A signal that is not read, or not where this one is, says nothing of it.
+        if known[there].all() and np.ptp(row[there]) > 0.0:
+            columns.append(row)
+    columns += drift_cosines(one, waves)
     for hertz in lines:
-        angle = 2.0 * np.pi * hertz * one.time
-        columns += [np.cos(angle), np.sin(angle)]
-    basis = np.linalg.qr(np.stack(columns, axis=1))[0]
-    return apart - basis @ (basis.T @ apart)
+        columns += line_columns(hertz, one.time)
+    basis = np.linalg.qr(np.stack(columns, axis=1)[there])[0]
+    apart[there] -= basis @ (basis.T @ apart[there])
+    return apart
+
+
+def _apart(one: Logged, other: Logged, channel: int) -> Array:
+    """What two repeats differ by over root 2 (SI), NaN where either has no reading, shape (rows,).
+
+    Empty where their times differ, or more than `MOST_MISSING` of the readings are missing: a
+    series with many holes tells no colour.
+    """
+    if not np.array_equal(one.time, other.time):
+        return np.empty(0)
+    read = (one.counts[channel] > 0.0) & (other.counts[channel] > 0.0)
+    if not read.any() or np.mean(~read) > MOST_MISSING:
+        return np.empty(0)
+    apart = np.full(len(one.time), np.nan)
+    apart[read] = (other.measured[channel] - one.measured[channel])[read] / np.sqrt(2.0)
+    return apart

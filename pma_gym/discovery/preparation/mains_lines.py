@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from scipy.stats import f as fisher
 
 from pma_gym.discovery.preparation.noise import Whitening
+from pma_gym.discovery.preparation.nuisance_projection import WANDER
 from pma_gym.estimation.logged import Logged
 
 Array = NDArray[np.float64]
@@ -19,14 +20,21 @@ Array = NDArray[np.float64]
 MAINS_HZ, HARMONICS = (50.0, 60.0), (1, 2, 3, 4, 5, 6)
 """Nominal frequencies of mains, and which multiples are looked for."""
 
-OFF_HZ = np.linspace(-0.2, 0.2, 9)
-"""How far the frequency of mains may be off (Hz)."""
+FARTHEST_HZ, STEPS = 0.2, (8, 400)
+"""How far the frequency of mains may be off (Hz), in at least and at most so many steps."""
+
+TURN = 0.5
+"""Turns by which a step of the frequency lets a wave gain on another over a trial: a step of a
+whole one passes a line by."""
 
 BESIDE_HZ = np.array([-2.5, -2.1, -1.7, -1.3, 1.3, 1.7, 2.1, 2.5])
 """Where the residual beside a line is taken (Hz from it)."""
 
 LEAST_ALIAS_HZ = 4.0
 """Alias below which a line is not looked for: commands excite the rig there."""
+
+FINER = 41
+"""Frequencies that are tried about the best of those steps."""
 
 CHANCE = 1e-5
 """That noise is taken for a line, for one signal and one frequency."""
@@ -67,22 +75,30 @@ def with_lines(
 def _beside_lines(noise: Whitening, lines: Sequence[float], power: float) -> Whitening:
     """Noise beside its lines, which were in its level as it was known, and in its colour."""
     level = float(np.sqrt(max(noise.level**2 - power, 0.25 * noise.level**2)))
-    return Whitening((), level, level, tuple(lines), noise.drift)
+    return Whitening((), level, level, tuple(lines), noise.drift, noise.waves)
 
 
 def _frequency(
     mains: float, noise: Sequence[Whitening], logged: Sequence[Logged], left: Sequence[Array]
 ) -> float:
     """The frequency near that of mains at which all residuals have most power."""
-    powers = []
-    for off in OFF_HZ:
-        power = 0.0
+
+    def power(hertz: float) -> float:
+        total = 0.0
         for channel, each in enumerate(noise):
             for part, trial in zip(left, logged, strict=True):
                 if np.isfinite(part[channel]).any():
-                    power += float(_power(mains + off, trial.time, part[channel]) / each.level**2)
-        powers.append(power)
-    return mains + float(OFF_HZ[int(np.argmax(powers))])
+                    at = np.array([hertz])
+                    total += _power(at, trial.time, part[channel]) / each.level**2
+        return total
+
+    longest = max(float(trial.time[-1] - trial.time[0]) for trial in logged)
+    steps = int(np.clip(2.0 * FARTHEST_HZ * longest / TURN, *STEPS))
+    tried = mains + np.linspace(-FARTHEST_HZ, FARTHEST_HZ, steps + 1)
+    best = float(tried[np.argmax([power(hertz) for hertz in tried])])
+    # What is off by an eighth of a turn still leaves a quarter of a line.
+    near = best + (tried[1] - tried[0]) * np.linspace(-1.0, 1.0, FINER)
+    return float(near[np.argmax([power(hertz) for hertz in near])])
 
 
 def line_size(hertz: float, logged: Sequence[Logged], parts: Sequence[Array]) -> float:
@@ -101,8 +117,10 @@ def _line(hertz: float, logged: Sequence[Logged], parts: Sequence[Array]) -> tup
         alias = abs(hertz - rate * np.round(hertz / rate))
         if not LEAST_ALIAS_HZ < alias < 0.5 * rate - 1.0 / (trial.time[-1] - trial.time[0]):
             return 0.0, 1.0
-        power += _power(hertz, trial.time, part)
-        beside += np.mean([_power(hertz + off, trial.time, part) for off in BESIDE_HZ])
+        # In a long trial the net's own frequency is looked for, and as long beside it.
+        near = _near(hertz, float(trial.time[-1] - trial.time[0]))
+        power += _power(hertz + near, trial.time, part)
+        beside += np.mean([_power(hertz + off + near, trial.time, part) for off in BESIDE_HZ])
         count, rows = count + 1, rows + known
     if not count or beside <= 0.0:
         return 0.0, 1.0
@@ -111,9 +129,19 @@ def _line(hertz: float, logged: Sequence[Logged], parts: Sequence[Array]) -> tup
     return float(np.sqrt(max(power - beside, 0.0) / rows)), chance
 
 
-def _power(hertz: float, time: Array, part: Array) -> float:
-    """Sum of squares (SI) that a line of free amplitude and phase explains of one trial."""
+def _near(hertz: float, duration: float) -> Array:
+    """Frequencies about a line's at which it may stand in a trial (Hz from it)."""
+    off = WANDER * hertz
+    steps = int(np.ceil(off * duration / TURN)) if off * duration > TURN else 0
+    return np.linspace(-off, off, 2 * steps + 1) if steps else np.zeros(1)
+
+
+def _power(hertz: Array, time: Array, part: Array) -> float:
+    """Sum of squares (SI) that a line of free amplitude and phase explains of one trial.
+
+    The largest of some frequencies, shape (n,).
+    """
     known = np.isfinite(part)
-    angle = 2.0 * np.pi * hertz * time[known]
-    wave = np.exp(-1j * angle)
-    return float(2.0 * np.abs(wave @ (part[known] - part[known].mean())) ** 2 / known.sum())
+    values, times = part[known] - part[known].mean(), time[known]
+    sums = [np.exp(-2j * np.pi * each * times) @ values for each in hertz]
+    return float(2.0 * np.max(np.abs(sums)) ** 2 / known.sum())

@@ -56,6 +56,7 @@ class Whitening:
         level: standard deviation of r itself (SI).
         lines: frequencies (Hz) of lines beside it, of free amplitude and phase in every trial.
         drift: root mean square of a slow drift beside it, another in every trial (SI).
+        waves: half waves that the drift has in a trial at least, as repeats tell.
     """
 
     coefficients: tuple[float, ...]
@@ -63,6 +64,7 @@ class Whitening:
     level: float
     lines: tuple[float, ...] = ()
     drift: float = 0.0
+    waves: int = 0
 
     def white(self, series: Array, missing: NDArray[np.int64]) -> Array:
         """Whitened series, shape (..., rows); 0 where a reading that it needs is missing."""

@@ -7,8 +7,11 @@ again (generalised least squares). What repeats from trial to trial keeps most o
 what differs between trials like a drift loses it.
 """
 
+from collections import OrderedDict
 from collections.abc import Callable
 from dataclasses import dataclass
+from hashlib import sha256
+from threading import Lock
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,8 +24,18 @@ Array = NDArray[np.float64]
 LEAST_COSINES, MOST_COSINES = 2, 4
 """Least and greatest number of cosines of a drift; the least is one period a trial."""
 
+WANDER, MOST_TURNS = 4e-4, 24
+"""How far a line's frequency is off in a trial, as a share of it: mains wander by 20 mHz, as an
+assumption of ours. And how many half turns of that a trial gives it at most."""
+
+LEAKS = 2
+"""Half turns beyond those that a line's wandering may have."""
+
 SLOW_SHARE = 0.1
 """Share of a command's variance below its slowest excited frequency."""
+
+MOST_BYTES = 2**27
+"""Memory of the projections that are kept: candidates of one diagnosis share them."""
 
 LEAST_PART = 1e-6
 """Part of a column that others must leave, or it is one of theirs."""
@@ -53,8 +66,12 @@ class Projection:
         return ((self.basis @ white) * self.shrunk) @ self.raw
 
 
+_made: OrderedDict[tuple[Whitening, bool, bytes], Projection] = OrderedDict()
+_lock = Lock()
+
+
 def projection(noise: Whitening, logged: Logged, channel: int, free_zero: bool) -> Projection:
-    """How nuisances are projected out of one signal of a trial.
+    """How nuisances are projected out of one signal of a trial; the latest are kept.
 
     Args:
         noise: of the signal.
@@ -62,11 +79,28 @@ def projection(noise: Whitening, logged: Logged, channel: int, free_zero: bool) 
         channel: the signal.
         free_zero: whether its zero is free.
     """
+    parts = (logged.time, logged.motor, logged.regulator, logged.missing[channel])
+    key = noise, free_zero, sha256(b"".join(map(np.ndarray.tobytes, parts))).digest()
+    with _lock:
+        known = _made.get(key)
+    if known is None:
+        known = _project(noise, logged, channel, free_zero)
+        with _lock:
+            _made[key] = known
+            while sum(each.basis.nbytes + each.raw.nbytes for each in _made.values()) > MOST_BYTES:
+                _made.popitem(last=False)
+    return known
+
+
+def _project(noise: Whitening, logged: Logged, channel: int, free_zero: bool) -> Projection:
+    """As `projection`, made anew."""
     time, missing = logged.time - logged.time[0], logged.missing[channel]
     free = [np.ones(len(time))] if free_zero else []
     for hertz in noise.lines:
-        free += [np.cos(2.0 * np.pi * hertz * time), np.sin(2.0 * np.pi * hertz * time)]
-    known = [noise.drift * each for each in drift_cosines(logged)] if noise.drift > 0.0 else []
+        free += line_columns(hertz, time)
+    known: list[Array] = []
+    if noise.drift > 0.0:
+        known = [noise.drift * each for each in drift_cosines(logged, noise.waves)]
     if known and not free_zero:
         known.append(np.full(len(time), noise.drift))
 
@@ -102,15 +136,35 @@ def _projection(
     return Projection(basis, loss, raw, shrunk)
 
 
-def drift_cosines(logged: Logged) -> list[Array]:
+def line_columns(hertz: float, time: Array) -> list[Array]:
+    """Cosine and sine of a line; of a long trial also with slow modulation, since mains wander.
+
+    Args:
+        hertz: its mean frequency.
+        time: of the rows (s), shape (rows,), from the first on.
+    """
+    duration = max(float(time[-1] - time[0]), 1e-300)
+    turns = min(int(2.0 * WANDER * hertz * duration), MOST_TURNS)
+    # What is no whole number of half turns leaks into the next ones.
+    turns += LEAKS if turns else 0
+    slow = [np.cos(np.pi * k * (time - time[0]) / duration) for k in range(turns + 1)]
+    angle = 2.0 * np.pi * hertz * time
+    return [each * wave for each in slow for wave in (np.cos(angle), np.sin(angle))]
+
+
+def drift_cosines(logged: Logged, waves: int = 0) -> list[Array]:
     """Cosines of a drift of mean square 1 in all, below half the slowest excited frequency.
 
     At least one period a trial, of a quarter of the power of half a period.
+
+    Args:
+        logged: the trial.
+        waves: least number of cosines, as repeats tell.
     """
     time = logged.time - logged.time[0]
     duration = max(float(time[-1]), 1e-300)
     most = int(duration * slowest_hertz(logged) + 1e-9)
-    count = int(np.clip(most, LEAST_COSINES, MOST_COSINES))
+    count = max(int(np.clip(most, LEAST_COSINES, MOST_COSINES)), waves)
     sizes = 1.0 / np.arange(1, count + 1)
     sizes *= np.sqrt(2.0 / np.sum(sizes**2))
     return [

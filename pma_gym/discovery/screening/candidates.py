@@ -17,6 +17,7 @@ from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
 from pma_gym.discovery.fitting.free_parameters import unit, values
 from pma_gym.discovery.screening.usual_sizes import Sizes, sizes
 from pma_gym.effects import CATALOGUE, Effect
+from pma_gym.effects.effect import signals
 from pma_gym.effects.ports import measured_output
 from pma_gym.plant import sensors
 from pma_gym.plant.model import Model, ModelError
@@ -69,15 +70,25 @@ def candidate_effects(
         *_at_neutral(model),
         *_slow_sensors(model),
     ]
-    return [each for each in candidates if each is not None and _can_act(model, each)]
+    has_pressure = _has_pressure(model, trials)
+    return [each for each in candidates if each is not None and _can_act(each, has_pressure)]
 
 
-def _can_act(model: Model, candidate: CandidateEffect) -> bool:
+def _has_pressure(model: Model, trials: Sequence[Trial]) -> bool:
+    """Whether anything is under pressure: a part on a testing machine may be under none."""
+    if model.rig.imposes_motion and trials:
+        return any(sensors.voltages(model, trial)[1].any() for trial in trials)
+    return model.rig.has_muscle or any(signal.is_pressure for signal in model.rig.signals)
+
+
+def _can_act(candidate: CandidateEffect, has_pressure: bool) -> bool:
     """Whether a rig has what an effect grows with: one without a pressure shows no part of it."""
-    if model.rig.has_muscle or any(signal.is_pressure for signal in model.rig.signals):
+    law = CATALOGUE[candidate.effect].law
+    if has_pressure:
         return True
     units = [unit(path) for path in candidate.fitted_paths]
-    return not all("kPa" in each or "bar" in each for each in units)
+    pressed = law is not None and signals(law) == ("pressure", "p")
+    return not pressed and not all("kPa" in each or "bar" in each for each in units)
 
 
 def _lacking(

@@ -1,8 +1,9 @@
-"""How large effects of a free rig usually are: by the forces, ways and speeds of its trials.
+"""How large effects of a rig usually are: by the forces, ways and speeds of its trials.
 
 A joint of a watch and one of a crane have the same effects. So an effect is looked for at a tenth
 of the drive's force, and at what that makes over the speeds and ways of the trials, in place of
-the sizes that the catalogue has for the station.
+the sizes that the catalogue has for the station. Where the motion is imposed the force is what its
+change in the trials says.
 """
 
 from collections.abc import Sequence
@@ -30,21 +31,26 @@ SMOOTH_S = 0.03
 LEAST_ROWS = 8
 """Fewest readings of a trial that say how far it goes."""
 
-DIMENSIONS: dict[str, tuple[int, int, int]] = {
-    "N": (1, 0, 0),
-    "N m": (1, 0, 0),
-    "N s/mm": (1, -1, 0),
-    "N m s": (1, -1, 0),
-    "N s^2/mm^2": (1, -2, 0),
-    "N m s^2": (1, -2, 0),
-    "N/mm": (1, 0, -1),
-    "N m/rad": (1, 0, -1),
-    "N/mm^3": (1, 0, -3),
-    "N m/rad^3": (1, 0, -3),
-    "mm/s": (0, 1, 0),
-    "deg/s": (0, 1, 0),
+DIMENSIONS: dict[str, tuple[int, int, int, int]] = {
+    "N": (1, 0, 0, 0),
+    "N m": (1, 0, 0, 0),
+    "N s/mm": (1, -1, 0, 0),
+    "N m s": (1, -1, 0, 0),
+    "N s^2/mm^2": (1, -2, 0, 0),
+    "N m s^2": (1, -2, 0, 0),
+    "N/mm": (1, 0, -1, 0),
+    "N m/rad": (1, 0, -1, 0),
+    "N/mm^3": (1, 0, -3, 0),
+    "N m/rad^3": (1, 0, -3, 0),
+    "N/kPa": (1, 0, 0, -1),
+    "mm/s": (0, 1, 0, 0),
+    "deg/s": (0, 1, 0, 0),
+    "1/m": (0, 0, -1, 0),
 }
-"""Powers of force, speed and way in a unit, for those that scale with them."""
+"""Powers of force, speed, way and pressure in a unit, for those that scale with them."""
+
+RIPPLE = 4.0
+"""Periods of a force that is periodic in the position, over half of the trials' longest way."""
 
 
 @dataclass(frozen=True)
@@ -52,29 +58,34 @@ class Sizes:
     """Sizes in trials (SI).
 
     Attributes:
-        force: of the drive, as the model has it at rest.
+        force: of the drive, as the model has it at rest; of an imposed motion, half its change.
         speed: of the position.
         way: half of the largest.
+        pressure: of the trials; 0 where there is none.
     """
 
     force: float
     speed: float
     way: float
+    pressure: float = 0.0
 
     def scaled(self, quantity: Quantity) -> Quantity:
         """A quantity with the usual value that the sizes make of it, within its bounds."""
         powers = DIMENSIONS.get(quantity.unit)
-        if powers is None or quantity.usual is None:
+        if powers is None or quantity.usual is None or (powers[-1] and not self.pressure):
             return quantity
-        force, speed, way = powers
-        share = FORCE_SHARE if force else SPEED_SHARE
-        usual = quantity.from_si(share * self.force**force * self.speed**speed * self.way**way)
+        force, speed, way, pressure = powers
+        share = FORCE_SHARE if force else SPEED_SHARE if speed else RIPPLE
+        size = self.force**force * self.speed**speed * self.way**way
+        usual = quantity.from_si(share * size * (self.pressure**pressure if pressure else 1.0))
         least = max(quantity.lower, 0.0)
         return replace(quantity, usual=float(np.clip(usual, least, quantity.upper)))
 
 
 def sizes(model: Model, trials: Sequence[Trial]) -> Sizes | None:
-    """Sizes in a free rig's trials; None where they say nothing, or of another rig."""
+    """Sizes in trials of a free rig or an imposed motion; None where they say nothing of it."""
+    if model.rig.imposes_motion:
+        return _imposed(model, trials)
     if not model.rig.drive_port:
         return None
     force = _large([_force(model, trial) for trial in trials])
@@ -84,6 +95,23 @@ def sizes(model: Model, trials: Sequence[Trial]) -> Sizes | None:
     way = 0.5 * max(float(np.ptp(values)) for _, values in read)
     speed = _large([_speeds(*each) for each in read])
     return Sizes(force, speed, way) if min(force, speed, way) > 0.0 else None
+
+
+def _imposed(model: Model, trials: Sequence[Trial]) -> Sizes | None:
+    """Of an imposed motion, whose force is what is measured."""
+    motions, pressures = zip(*(sensors.voltages(model, trial) for trial in trials), strict=True)
+    forces = [trial.measurements["force"] for trial in trials if "force" in trial.measurements]
+    changes = [each - np.nanmedian(each) for each in forces if np.isfinite(each).any()]
+    if not changes:
+        return None
+    way = 0.5 * max(float(np.ptp(each)) for each in motions)
+    each = zip(trials, motions, strict=True)
+    speed = _large([_speeds(trial.time, motion) for trial, motion in each])
+    force = _large(changes)
+    if not min(force, speed, way) > 0.0:
+        return None
+    line = model.parameters.get("regulator_line")
+    return Sizes(force, speed, way, 0.0 if line is not None else _large(pressures))
 
 
 def _path(model: Model, trial: Trial) -> tuple[np.ndarray, np.ndarray] | None:

@@ -48,6 +48,10 @@ LEAST_CHANGE = 0.15
 """Least rms of what an effect changes beyond parameters, over the noise of the signal where that is
 most: what is smaller is not worth a name, and no model's arithmetic is that exact."""
 
+PIECES_CHANGE = 0.05
+"""The same of pieces with a start of their own each: it takes up most of what an effect does in the
+whole trial."""
+
 COARSE_CHANGE = 0.5
 """The same beside a sensor whose readings keep to coarse steps: what is lost between them is no
 noise, and follows the motion."""
@@ -202,8 +206,8 @@ def _stage(
     least, plainly = 0.0, scores
     if scan.excess:
         rows = sum(len(trial.time) for trial in problem.trials)
-        # As large as a change must be (`LEAST_CHANGE`), were it all in one signal.
-        least = max(CARRIED * scan.excess, LEAST_CHANGE**2 * rows)
+        # As large as a change must be, were it all in one signal.
+        least = max(CARRIED * scan.excess, _least_change(problem) ** 2 * rows)
         scores = _refined_scores(problem, baseline, before, scores, scan.chance, least)
         gate = tuple(each for each in scores if each.starts)
     fits: dict[str, Fitted] = {}
@@ -271,8 +275,14 @@ def _refined_scores(
 
 def passes(problem: FitProblem, each: ScreeningScore, missing: bool = False) -> bool:
     """Whether chance, or arithmetic, would not show as much; chance may be ruled out already."""
-    least = COARSE_CHANGE if problem.coarse else LEAST_CHANGE
+    least = COARSE_CHANGE if problem.coarse else _least_change(problem)
     return (missing or each.p_value <= ALARM) and each.change >= least
+
+
+def _least_change(problem: FitProblem) -> float:
+    """Least rms of what an effect changes, over the noise."""
+    in_pieces = len(set(problem.files)) < len(problem.trials)
+    return PIECES_CHANGE if in_pieces else LEAST_CHANGE
 
 
 def _likeliest(stage: Stage, first: Stage) -> str | None:

@@ -82,6 +82,5 @@ PRESSURE_FRICTION = Effect(
     law=pressure_friction,
     rate_independent_law=friction_path,
     release_path=release_path,
-    held=("presliding",),
     signature="odd step of force where the motion turns, in proportion to the pressure",
 )

@@ -7,6 +7,7 @@ from pma_gym.data.datasets.dataset import NamedTrial
 from pma_gym.data.trial import Trial
 from pma_gym.discovery.preparation.data_checks.lead_in import with_lead_in
 from pma_gym.discovery.preparation.prepared_trials import prepared
+from pma_gym.discovery.preparation.recorded_bandwidth import with_recorded_bandwidth
 from pma_gym.discovery.screening.candidates import candidate_effects
 from tests.plant.test_imposed import FRICTION, SINE, TIME, imposed
 
@@ -57,3 +58,26 @@ def test_a_ripple_is_looked_for_about_its_usual_number_of_periods():
     (ripple,) = [c for c in candidate_effects(imposed()) if c.name == "cogging"]
     looked = np.unique(ripple.probes[:, ripple.paths.index("cogging.periods_per_m")])
     np.testing.assert_allclose(looked, 12.5 * np.arange(1, 21))
+
+
+def test_averaged_rows_record_a_motion_of_less_bandwidth():
+    fast = imposed().replace({"imposed_motion.bandwidth_hz": 40.0})
+    rows = slice(None, None, 4)
+    fewer = named(TIME[rows], 0.02 * SINE[rows]).trial
+    rate = 1.0 / (TIME[4] - TIME[0])
+    slower, words = with_recorded_bandwidth(fast, [fewer])
+    assert slower.parameters["imposed_motion"].bandwidth == pytest.approx(0.4 * rate)
+    assert f"{0.4 * rate:.3g} Hz, not 40 Hz" in words[0]
+    same, nothing = with_recorded_bandwidth(imposed(), [named(TIME, 0.02 * SINE).trial])
+    assert same == imposed() and not nothing
+
+
+def test_without_a_pressure_nothing_is_looked_for_that_pressure_makes():
+    force = {"force": 3.0 * SINE}
+    without = Trial(TIME, {"contraction_command": 0.02 * SINE}, force)
+    pressed = Trial(TIME, {**without.commands, "pressure_command": np.full(len(TIME), 1e5)}, force)
+    pressing = {"pressure_friction", "piston_force"}
+    names = [{c.name for c in candidate_effects(imposed(), None, [t])} for t in (without, pressed)]
+    assert not pressing & names[0]
+    assert pressing <= names[1]
+    assert names[1] - names[0] <= pressing | {"symmetric_damping_slope"}

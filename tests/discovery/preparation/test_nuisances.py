@@ -65,6 +65,63 @@ def test_a_drift_is_learnt_from_repeats_and_one_that_repeats_is_structure() -> N
     assert learnt_noise(_levels(), logged, named)[CHANNEL].drift == 0.0
 
 
+def test_repeats_with_holes_tell_the_noise_too() -> None:
+    """Readings that were set aside, as outliers are, hide neither colour nor drift of the rest."""
+    rng = np.random.default_rng(4)
+    slow = np.cos(np.pi * np.arange(1024) / 1024)
+    noises = [_coloured(rng, 0.8, 1024) + sign * slow for sign in (2.0, -2.0)]
+    for noise in noises:
+        noise[rng.choice(1024, 20, replace=False)] = np.nan
+    logged, named = _logged(noises)
+    learnt = learnt_noise(_levels(), logged, named)[CHANNEL]
+    assert learnt.coefficients[0] == pytest.approx(0.8, abs=0.1)
+    assert learnt.drift > LEVEL
+
+
+@pytest.mark.parametrize("turns", [0.7, 1.5, 2.2])
+def test_a_drift_has_as_many_half_waves_as_repeats_tell(turns: float) -> None:
+    """What it leaves of a wave of other phases in each repeat is less than a third of the noise."""
+    rng, at = np.random.default_rng(5), np.arange(1024) / 1024
+    waves = [2.0 * np.sin(2.0 * np.pi * turns * at + phase) for phase in (0.4, 3.0)]
+    logged, named = _logged([rng.standard_normal(1024) + wave for wave in waves])
+    learnt = learnt_noise(_levels(), logged, named)[CHANNEL]
+    made = projection(learnt, logged[0], CHANNEL, free_zero=False)
+    left = waves[0][None].copy()
+    made.out_of(left)
+    assert np.sqrt(np.mean(left**2)) < 0.33
+
+
+def _humming(hertz: list[float], seconds: float) -> tuple[list[Logged], list[np.ndarray]]:
+    """Trials whose residual is noise and a line as large, of some frequency and phase in each."""
+    rng, time = np.random.default_rng(6), np.arange(round(seconds * RATE)) / RATE
+    left = []
+    for each in hertz:
+        part = np.full((4, len(time)), np.nan)
+        angle = 2.0 * np.pi * each * time + rng.uniform(0.0, 6.0)
+        part[CHANNEL] = LEVEL * (rng.standard_normal(len(time)) + np.sqrt(2.0) * np.sin(angle))
+        left.append(part)
+    return _logged([np.zeros(len(time))] * len(hertz))[0], left
+
+
+@pytest.mark.parametrize(
+    ("hertz", "seconds"), [([59.966] * 3, 8.0), ([50.027] * 3, 8.0), ([49.985, 49.999], 70.0)]
+)
+def test_of_a_line_less_than_a_tenth_of_the_noise_is_left(
+    hertz: list[float], seconds: float
+) -> None:
+    """Mains are never at 50 or 60 Hz, and in long trials not at the same frequency twice."""
+    logged, left = _humming(hertz, seconds)
+    noise = with_lines(_levels(), logged, left)[CHANNEL]
+    assert len(noise.lines) == 1
+    for part, trial, each in zip(left, logged, hertz, strict=True):
+        made = projection(replace(white_noise(1.0), lines=noise.lines), trial, CHANNEL, False)
+        known = part[CHANNEL][None].copy()
+        made.out_of(known)
+        line = np.exp(-2j * np.pi * each * trial.time) / len(trial.time)
+        assert np.abs(known[0] @ line) < 0.1 * np.abs(part[CHANNEL] @ line)
+        assert np.std(known) == pytest.approx(LEVEL, rel=0.08)
+
+
 def test_only_mains_and_their_aliases_are_lines() -> None:
     """50 Hz and the third harmonic's alias are fitted; a tone of 9 Hz is structure."""
     rng, time = np.random.default_rng(3), np.arange(1024) / RATE

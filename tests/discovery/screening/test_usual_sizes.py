@@ -7,7 +7,9 @@ from pma_gym.data.trial import Trial
 from pma_gym.discovery.screening.candidates import candidate_effects
 from pma_gym.discovery.screening.usual_sizes import sizes
 from pma_gym.plant.model import load_model
+from pma_gym.units import Quantity
 from tests.discovery.test_joint import joint
+from tests.plant.test_imposed import SINE, TIME, imposed
 
 
 def swung(torque, angle, hertz=2.0):
@@ -45,3 +47,20 @@ def test_a_log_of_speed_alone_has_the_sizes_of_its_motion():
 
 def test_a_station_keeps_the_sizes_of_the_catalogue():
     assert sizes(load_model("station"), []) is None
+
+
+@pytest.mark.parametrize("factor", [1.0, 1e4])
+def test_an_imposed_motion_has_the_sizes_of_the_force_that_it_takes(factor):
+    """A tenth of the force's change, and what that makes over the motion's speeds and ways."""
+    swing = 0.02 * SINE
+    commands = {"contraction_command": swing, "pressure_command": np.full(len(TIME), 2e5)}
+    trial = Trial(TIME, commands, {"force": 7.0 + 5.0 * factor * SINE})
+    known = sizes(imposed(), [trial])
+    assert known is not None
+    # Half of the sine's change beyond its median, nine tenths of the time below.
+    assert known.force == pytest.approx(2.5 * factor, rel=0.05)
+    assert known.way == pytest.approx(0.01, rel=0.01)
+    assert known.speed == pytest.approx(np.quantile(np.abs(np.gradient(swing, TIME)), 0.9), rel=0.1)
+    assert known.pressure == pytest.approx(2e5)
+    per_pressure = Quantity("N/kPa", 0.0, 1e9, "a test", 0.0, usual=1.0)
+    assert known.scaled(per_pressure).usual == pytest.approx(0.1 * known.force / 200.0)

@@ -13,6 +13,8 @@ from benchmarks.hidden_effects.rigs.imposed_rig import ImposedRig, draw_imposed
 from benchmarks.hidden_effects.rigs.noise import Noise
 from benchmarks.hidden_effects.rigs.offers import OFFERS
 from benchmarks.hidden_effects.rigs.simulators import imposed_force, mujoco_force
+from pma_gym import Plant, load_model
+from pma_gym.data.datasets.dataset import read_dataset
 
 RIG = ImposedRig("imposed", 2.0, 30.0, 400.0, 5e-4, (1e5,), 0.05, 0.5, 500.0)
 OMEGA = 2.0 * math.pi * 0.5
@@ -144,7 +146,7 @@ def test_files_have_the_load_cell_s_noise_and_step():
     campaign = replace(
         campaign, cell=replace(campaign.cell, noise=Noise(campaign.cell.noise.white))
     )
-    read = campaign.tables(())[0]["load_n"][0]
+    read = campaign.tables(())[0]["force_n"][0]
     exact = campaign.force((), 0)
     assert float(np.std(read - exact)) == pytest.approx(campaign.cell.rms, rel=0.1)
     counts = read / campaign.cell.step
@@ -158,3 +160,18 @@ def test_machines_are_of_all_sizes():
         {bool(rig.area) for rig in rigs} == {bool(rig.stiffness) for rig in rigs} == {True, False}
     )
     assert all(len(rig.pressures) == 4 for rig in rigs)
+
+
+@pytest.mark.parametrize("seed", [0, 2, 5])
+def test_with_its_true_numbers_a_lab_s_model_leaves_the_sensor_s_noise(seed, tmp_path):
+    """Two programs that know nothing of each other give the same force."""
+    campaign = draw_tested(np.random.default_rng(seed), "imposed", "own", (3, seed))
+    quiet = replace(campaign.cell, noise=Noise(campaign.cell.noise.white))
+    campaign = replace(campaign, believed=campaign.rig, cell=quiet, motions=campaign.motions[:2])
+    for name, text in campaign.texts(()).items():
+        (tmp_path / name).write_text(text, "utf-8")
+    plant = Plant(load_model(str(tmp_path / "model.toml")))
+    for named in read_dataset(tmp_path).trials:
+        made = plant.simulate(replace(named.trial, measurements={}))
+        left = named.trial.measurements["force"] - made.measurements["force"]
+        assert np.std(left) == pytest.approx(quiet.rms, rel=0.1)
