@@ -95,18 +95,19 @@ SLIDE_NOISE = 1e-5
 
 
 @cache
-def driven_slide(friction=0.0, lanes=4, seconds=4.0, rate=250):
+def driven_slide(friction=0.0, lanes=4, seconds=4.0, rate=250, seed=31, static=1.3, speed=6e-3):
     """Trials of a slide that a controller drives to and fro, pushing and pulling, while it drifts.
 
     The controller sees the noisy position that is logged, so that its command goes with the noise.
-    The load is straight between rows. Friction of the slide (N) is LuGre's, with Stribeck's rise.
+    The load is straight between rows. Friction of the slide (N) is LuGre's; `static` times as large
+    at rest, it falls with the speed (m/s) as Stribeck has it.
     """
-    generator, substeps = np.random.default_rng(31), 16
+    generator, substeps = np.random.default_rng(seed), 16
     step, rows = 1.0 / (rate * substeps), round(seconds * rate) + 1
     gains = 4500.0, 240.0
     phases, drift = generator.uniform(0, 6, (lanes, 3)), generator.uniform(-20e-3, 20e-3, lanes)
     hertz, sizes = np.array([0.35, 0.8, 1.7]), np.array([18e-3, 9e-3, 4e-3])
-    bristles = Bristles(8e-6, 1.3, 6e-3)
+    bristles = Bristles(8e-6, static, speed)
     bristles.begin(lanes)
 
     def wished(time):

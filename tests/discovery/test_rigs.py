@@ -68,6 +68,18 @@ def test_what_is_hidden_in_an_example_is_named_and_sized(name):
     assert all(gap.held_out for gap in diagnosis.gap.values())
 
 
+@pytest.mark.campaign
+def test_the_interval_of_a_static_friction_holds_what_is_hidden():
+    """Chi-square is rugged there: other optima explain the trials as well, from 15 to 16 N."""
+    diagnosis = diagnosed("driven_slide")
+    assert diagnosis.converged and "did not converge" not in diagnosis.sentence
+    static = diagnosis.effects[0].parameters["static_n"]
+    assert static.low is not None and static.high is not None
+    assert static.low < 15.6 < static.high
+    # As wide as the optima that explain the trials about as well lie apart.
+    assert static.high - static.low > 0.3
+
+
 @pytest.mark.parametrize(
     "name",
     [

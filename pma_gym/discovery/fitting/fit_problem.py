@@ -49,6 +49,8 @@ class Fitted:
         converged: whether a further step would gain nothing worth while.
         reach: how many times as wide as assumed beforehand the range of a parameter became, by
             path, for those that went beyond.
+        spread: ends of the intervals at all optima that explain the trials about as well, by
+            path; empty where one optimum is known.
     """
 
     model: Model
@@ -60,6 +62,7 @@ class Fitted:
     steps: Array
     converged: bool
     reach: Mapping[str, float] = field(default_factory=dict)
+    spread: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
     def estimate(self, path: str) -> tuple[float, float]:
         """A parameter's value and its standard error, in file units."""
@@ -84,6 +87,7 @@ class FitProblem:
         coarse: whether a sensor keeps to coarser steps than its DAQ gives.
         files: the file that each trial comes from; empty where each is a file of its own.
         widens: whether a parameter may go beyond what is assumed of it beforehand.
+        wholes: of which whole trial each is a piece (`short_pieces`); empty where each is whole.
     """
 
     trials: Sequence[Trial]
@@ -94,6 +98,7 @@ class FitProblem:
     coarse: bool = False
     files: tuple[str, ...] = ()
     widens: bool = True
+    wholes: tuple[int, ...] = ()
 
     def whitened_residuals(
         self,
@@ -126,7 +131,7 @@ class FitProblem:
             self.noise,
             prior,
             centre,
-            {path: [each[i] for i in chosen] for path, each in own.items()},
+            {path: [each[self._whole(i)] for i in chosen] for path, each in own.items()},
             threads=self.threads,
             reach=reach,
         )
@@ -142,6 +147,10 @@ class FitProblem:
             own=candidate.own,
             threads=self.threads,
         )
+
+    def _whole(self, number: int) -> int:
+        """The whole trial that a trial is a piece of."""
+        return self.wholes[number] if self.wholes else number
 
     @cached_property
     def count(self) -> int:
@@ -208,10 +217,21 @@ class FitProblem:
         """
         if not self.far(fit):
             return fit
-        left = self.left(fit)
-        ever_less = [left / EASIER**k for k in range(int(np.log(left) / np.log(EASIER)) + 1)]
-        refit = self.fit(self._eased(fit.model, extra, ever_less), extra)
+        refit = self.eased_fit(fit.model, extra, self.left(fit))
         return min(filter(None, (fit, refit)), key=_chi_square)
+
+    def eased_fit(
+        self, model: Model, extra: Sequence[CandidateEffect], left: float
+    ) -> Fitted | None:
+        """Fit a model to noise as large as a residual, then to ever less noise.
+
+        Args:
+            model: where its own parameters begin.
+            extra: the candidates in it.
+            left: rms of the residual, in standard deviations of the noise.
+        """
+        ever_less = [left / EASIER**k for k in range(int(np.log(left) / np.log(EASIER)) + 1)]
+        return self.fit(self._eased(model, extra, ever_less), extra)
 
     def _eased(
         self, model: Model, extra: Sequence[CandidateEffect], larger: Sequence[float]

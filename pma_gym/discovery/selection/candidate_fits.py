@@ -14,6 +14,7 @@ from pma_gym.discovery.screening.probe_scores import Baseline
 from pma_gym.discovery.screening.scanned_range import ScannedRange, scanned_range
 from pma_gym.discovery.screening.score_test import ScreeningScore
 from pma_gym.discovery.screening.starting_points import starting_points
+from pma_gym.discovery.selection.rugged_fits import best_of_optima, is_rugged
 from pma_gym.document_shape import ANY, ListOf, Real, check_shape
 from pma_gym.effects import CATALOGUE
 from pma_gym.plant.model import Model
@@ -238,7 +239,8 @@ def better(
     def search() -> Fitted:
         refit = problem.careful_fit(fit.model.replace(_given(problem)), chosen)
         best = fit if refit is None or refit.chi_square >= fit.chi_square else refit
-        return problem.continuation(best, chosen)
+        best = problem.continuation(best, chosen)
+        return best_of_optima(problem, best, chosen) if is_rugged(best, chosen) else best
 
     return _once("better", problem, fit, chosen, journal, search)
 
@@ -306,6 +308,7 @@ _KEPT = {
     "steps": ListOf(Real(finite=False)),
     "converged": bool,
     "reach": {ANY: Real(1.0)},
+    "spread": {ANY: ListOf(Real())},
 }
 """Shape of a fit in a journal."""
 
@@ -320,6 +323,7 @@ def kept_form(fit: Fitted) -> dict:
         "steps": fit.steps.tolist(),
         "converged": bool(fit.converged),
         "reach": dict(fit.reach),
+        "spread": {path: list(ends) for path, ends in fit.spread.items()},
     }
 
 
@@ -359,4 +363,5 @@ def restored(
         np.array(kept["steps"]),
         kept["converged"],
         kept["reach"],
+        {path: (min(ends), max(ends)) for path, ends in kept["spread"].items()},
     )

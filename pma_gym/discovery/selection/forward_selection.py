@@ -38,6 +38,7 @@ from pma_gym.discovery.selection.candidate_fits import (
     unfitted,
     without_idle,
 )
+from pma_gym.discovery.selection.rugged_fits import is_rugged, settled
 from pma_gym.discovery.selection.unscored_fits import unscored_fits
 
 ALARM = 0.005
@@ -166,6 +167,8 @@ def select(
             break
     problem = replace(problem, noise=reestimated_noise(problem, best, chosen))
     fit = refit(problem, best, chosen, journal)
+    if is_rugged(fit, chosen):
+        fit = settled(problem, replace(fit, spread=best.spread), chosen)
     fit = replace(fit, covariance=covariance(problem, fit, chosen))
     return Selection(tuple(stages), chosen, fit, problem, refitted)
 

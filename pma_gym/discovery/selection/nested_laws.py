@@ -10,20 +10,18 @@ the parameter that may be equal is not at an end of its range: a static friction
 law's form for something else.
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
-from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
 from pma_gym.discovery.fitting.covariance import covariance
 from pma_gym.discovery.fitting.fit_problem import FitProblem, Fitted
-from pma_gym.discovery.fitting.free_parameters import at_limit, unit, values
+from pma_gym.discovery.fitting.free_parameters import at_limit, unit
 from pma_gym.discovery.fitting.held_out import held_out_misfit
 from pma_gym.discovery.result.estimates import Undetermined
 from pma_gym.discovery.selection.candidate_fits import cost
 from pma_gym.discovery.selection.profile_limits import limits
-from pma_gym.effects import CATALOGUE
+from pma_gym.discovery.selection.tied_laws import Chosen, Nested, fit_held, fit_tied, ties
 
 FLAT = 4.0
 """Chi-square by which a profile may rise and still be flat: twice a log-likelihood of 2."""
@@ -31,31 +29,8 @@ FLAT = 4.0
 UNSURE = 3.0
 """Standard errors within which a limit, or a parameter that may be equal, makes one doubtful."""
 
-EQUAL = 1e-3
-"""Share by which two parameters that are held equal may differ in the end."""
-
-ROUNDS = 5
-"""How often they are held equal anew, each time at what the other became."""
-
 HALVINGS = 5
 """How often the place where a profile leaves its flat is halved."""
-
-Chosen = tuple[CandidateEffect, ...]
-
-
-@dataclass(frozen=True)
-class Nested:
-    """Effects whose laws have lost what the trials do not determine.
-
-    Attributes:
-        chosen: the effects.
-        fit: of the model with them.
-        undetermined: what left, by path.
-    """
-
-    chosen: Chosen
-    fit: Fitted
-    undetermined: Mapping[str, Undetermined]
 
 
 def nested(problem: FitProblem, fit: Fitted, chosen: Chosen) -> Nested:
@@ -93,7 +68,7 @@ def _left(problem: FitProblem, state: Nested, path: str) -> Nested | None:
         for end in (low, high)
         if not np.isfinite(error) or abs(value - end) < UNSURE * error or _beyond(value, end, low)
     ]
-    held = {end: _held(problem, state, place, {path: end}) for end in doubtful}
+    held = {end: fit_held(problem, state, place, {path: end}) for end in doubtful}
     flat = {end: new for end, new in held.items() if new is not None and _flat(state.fit, new.fit)}
     if not flat:
         return None
@@ -116,21 +91,6 @@ def _flat(best: Fitted, held: Fitted) -> bool:
     return held.chi_square - best.chi_square < FLAT
 
 
-def _held(
-    problem: FitProblem,
-    state: Nested,
-    place: int,
-    at: Mapping[str, float],
-    begun: Mapping[str, float] | None = None,
-) -> Nested | None:
-    """The fit with some parameters of an effect held, others begun at values."""
-    candidate = state.chosen[place]
-    less = replace(candidate, left=(*candidate.left, *at))
-    chosen = (*state.chosen[:place], less, *state.chosen[place + 1 :])
-    refit = problem.fit(state.fit.model.replace({**at, **(begun or {})}), chosen)
-    return None if refit is None else replace(state, chosen=chosen, fit=refit)
-
-
 def _bound(
     problem: FitProblem, state: Nested, place: int, path: str, ends: tuple[float, float]
 ) -> float | None:
@@ -139,7 +99,7 @@ def _bound(
     logarithmic = min(ends) > 0.0
     for _ in range(HALVINGS):
         middle = float(np.sqrt(flat * steep) if logarithmic else 0.5 * (flat + steep))
-        new = _held(problem, state, place, {path: middle})
+        new = fit_held(problem, state, place, {path: middle})
         if new is not None and _flat(state.fit, new.fit):
             flat = middle
         else:
@@ -157,22 +117,17 @@ def _all_tied(problem: FitProblem, state: Nested) -> Nested:
 def _tied(problem: FitProblem, state: Nested, place: int) -> Nested | None:
     """With the simpler law of an effect; None where it has none, or the trials refuse it."""
     candidate = state.chosen[place]
-    doors = CATALOGUE[candidate.effect].names_at_the_door()
-    stems = {doors[path.partition(".")[2]]: path for path in candidate.fitted_paths}
-    for one, other, *idle in CATALOGUE[candidate.effect].ties:
-        path, twin = stems.get(one), stems.get(other)
-        if path is None or twin is None:
-            continue
-        rest = [stems[stem] for stem in idle if stem in stems]
-        equal = _equal(problem, state, place, (path, twin), rest)
+    for tie in ties(candidate):
+        simpler = fit_tied(problem, state, place, tie)
         # What the whole law explains more must be worth its parameters, as anywhere.
-        if equal is not None and (
-            cost(equal.fit) < cost(state.fit)
-            or _ended(problem, state, path)
-            or not _asked_for(problem, state, equal)
+        if simpler is not None and (
+            cost(simpler.fit) < cost(state.fit)
+            or _ended(problem, state, tie.path)
+            or not _asked_for(problem, state, simpler)
         ):
-            known = {each: Undetermined(None, None, unit(each)) for each in (path, *rest)}
-            return replace(equal, undetermined={**state.undetermined, **known})
+            left = (tie.path, *tie.idle)
+            known = {each: Undetermined(None, None, unit(each)) for each in left}
+            return replace(simpler, undetermined={**state.undetermined, **known})
     return None
 
 
@@ -198,26 +153,6 @@ def _asked_for(problem: FitProblem, whole: Nested, simpler: Nested) -> bool:
     if theirs is None or others is None:
         return True
     return bool(np.mean(theirs.chi_square < others.chi_square) > 0.5)
-
-
-def _equal(
-    problem: FitProblem, state: Nested, place: int, pair: tuple[str, str], rest: list[str]
-) -> Nested | None:
-    """The best fit in which the first of two parameters equals the other, and some do nothing."""
-    path, twin = pair
-    idle = dict(zip(rest, values(state.fit.model, rest).tolist(), strict=True))
-    best: Nested | None = None
-    for size in (state.fit.estimate(twin)[0], state.fit.estimate(path)[0]):
-        for _ in range(ROUNDS):
-            held = _held(problem, state, place, {path: size} | idle, {twin: size})
-            if held is None:
-                break
-            before, size = size, held.fit.estimate(twin)[0]
-            if abs(size - before) < EQUAL * abs(size):
-                if best is None or held.fit.chi_square < best.fit.chi_square:
-                    best = held
-                break
-    return best
 
 
 def _place(chosen: Chosen, path: str) -> int:

@@ -1,0 +1,105 @@
+"""The simpler law within an effect's law: fits in which the parameters that it ties are equal."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pma_gym.discovery.fitting.candidate_effect import CandidateEffect, bounds
+from pma_gym.discovery.fitting.fit_problem import FitProblem, Fitted
+from pma_gym.discovery.result.estimates import Undetermined
+from pma_gym.effects import CATALOGUE
+
+EQUAL = 1e-3
+"""Share by which two parameters that are held equal may differ in the end."""
+
+ROUNDS = 5
+"""How often they are held equal anew, each time at what the other became."""
+
+IDLE_SHARE = 0.1
+"""Share of its usual value at which a parameter is held that does nothing in the simpler law. While
+the two others still differ, a Stribeck speed far below the speeds of the trials leaves nearly all
+readings to the second, and what that becomes does not depend on the first."""
+
+Chosen = tuple[CandidateEffect, ...]
+
+
+@dataclass(frozen=True)
+class Nested:
+    """Effects whose laws have lost what the trials do not determine.
+
+    Attributes:
+        chosen: the effects.
+        fit: of the model with them.
+        undetermined: what left, by path.
+    """
+
+    chosen: Chosen
+    fit: Fitted
+    undetermined: Mapping[str, Undetermined]
+
+
+@dataclass(frozen=True)
+class Tie:
+    """Parameters by which a law becomes simpler.
+
+    Attributes:
+        path: the one that equals another in the simpler law.
+        twin: the other.
+        idle: those that do nothing there.
+    """
+
+    path: str
+    twin: str
+    idle: tuple[str, ...]
+
+
+def ties(candidate: CandidateEffect) -> Iterator[Tie]:
+    """The simpler laws of an effect whose parameters are fitted."""
+    doors = CATALOGUE[candidate.effect].names_at_the_door()
+    stems = {doors[path.partition(".")[2]]: path for path in candidate.fitted_paths}
+    for one, other, *idle in CATALOGUE[candidate.effect].ties:
+        if one in stems and other in stems:
+            rest = tuple(stems[stem] for stem in idle if stem in stems)
+            yield Tie(stems[one], stems[other], rest)
+
+
+def fit_held(
+    problem: FitProblem,
+    state: Nested,
+    place: int,
+    at: Mapping[str, float],
+    begun: Mapping[str, float] | None = None,
+) -> Nested | None:
+    """The fit with some parameters of an effect held, others begun at values."""
+    candidate = state.chosen[place]
+    less = replace(candidate, left=(*candidate.left, *at))
+    chosen = (*state.chosen[:place], less, *state.chosen[place + 1 :])
+    refit = problem.fit(state.fit.model.replace({**at, **(begun or {})}), chosen)
+    return None if refit is None else replace(state, chosen=chosen, fit=refit)
+
+
+def idle_values(candidate: CandidateEffect, tie: Tie, share: float) -> dict[str, float]:
+    """Values of what does nothing in the simpler law: a share of their usual ones, by path."""
+    usual = dict(zip(candidate.paths, candidate.absent.tolist(), strict=True))
+    lower, upper = bounds(tie.idle)
+    clipped = np.clip([share * usual[path] for path in tie.idle], lower, upper)
+    return dict(zip(tie.idle, clipped.tolist(), strict=True))
+
+
+def fit_tied(problem: FitProblem, state: Nested, place: int, tie: Tie) -> Nested | None:
+    """The best fit in which the first of two parameters equals the other, and some do nothing."""
+    path, twin = tie.path, tie.twin
+    idle = idle_values(state.chosen[place], tie, IDLE_SHARE)
+    best: Nested | None = None
+    for size in (state.fit.estimate(twin)[0], state.fit.estimate(path)[0]):
+        for _ in range(ROUNDS):
+            new = fit_held(problem, state, place, {path: size} | idle, {twin: size})
+            if new is None:
+                break
+            before, size = size, new.fit.estimate(twin)[0]
+            if abs(size - before) < EQUAL * abs(size):
+                if best is None or new.fit.chi_square < best.fit.chi_square:
+                    best = new
+                break
+    return best

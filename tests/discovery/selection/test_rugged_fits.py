@@ -1,0 +1,91 @@
+"""Fits that bear a rugged chi-square: dry friction with a static level that a slide sticks by."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pma_gym.data.datasets.dataset import NamedTrial
+from pma_gym.discovery.fitting.derivative_free import refined
+from pma_gym.discovery.fitting.fit_problem import FitProblem
+from pma_gym.discovery.fitting.free_parameters import free_parameters
+from pma_gym.discovery.fitting.short_pieces import in_short_pieces
+from pma_gym.discovery.preparation.noise import white_noise
+from pma_gym.discovery.preparation.prepared_trials import prepared
+from pma_gym.discovery.screening.candidates import candidate_effects
+from pma_gym.discovery.selection import rugged_fits
+from pma_gym.discovery.selection.rugged_fits import best_of_optima, is_rugged
+from pma_gym.plant.model import load_model
+from tests.discovery.rig_trials import FROZEN, driven_slide
+
+MODEL = load_model(FROZEN / "driven_slide" / "model.toml")
+DRY = next(each for each in candidate_effects(MODEL) if each.name == "coulomb_friction")
+DYNAMIC = "coulomb_friction.dynamic_n"
+
+
+def problem_of(trials):
+    named, _ = prepared([NamedTrial(f"{k}", trial) for k, trial in enumerate(trials)], MODEL)
+    return FitProblem(
+        [each.trial for each in named], MODEL, free_parameters(MODEL), (white_noise(1e-5),) * 2
+    )
+
+
+def fit_from(problem, *begun):
+    """A fit of the whole law, begun at static, dynamic (N) and Stribeck's speed (mm/s)."""
+    start = np.array([*begun, *DRY.absent[len(begun) :]])
+    fit = problem.fit(MODEL, (DRY,), {DRY.name: start})
+    assert fit is not None
+    return fit
+
+
+def test_a_fit_that_stops_far_off_is_begun_again_at_the_simpler_law():
+    problem = problem_of(driven_slide(12.0, lanes=3, seconds=0.7, rate=100))
+    fit = fit_from(problem, 30.0, 10.0, 0.5)
+    assert is_rugged(fit, (DRY,))
+    best = best_of_optima(problem, fit, (DRY,))
+    assert best.chi_square < 0.5 * fit.chi_square
+    assert best.estimate(DYNAMIC)[0] == pytest.approx(12.0, rel=0.05)
+    for path, value in zip(best.paths, best.values, strict=True):
+        low, high = best.spread[path]
+        assert low <= value <= high
+
+
+def test_a_refined_fit_explains_more_and_says_what_it_explains():
+    problem = problem_of(driven_slide(12.0, lanes=2, seconds=0.5, rate=100))
+    fit = fit_from(problem, 14.0, 12.0, 10.0)
+    refit = refined(problem, fit, (DRY,))
+    assert refit.chi_square < fit.chi_square
+    again = problem.whitened_at(refit, (DRY,)).sums(refit.values, np.empty(0))
+    assert refit.chi_square == pytest.approx(again.chi_square, rel=1e-9)
+
+
+def test_short_pieces_begin_where_the_slide_moves_fastest():
+    problem = problem_of(driven_slide(12.0, lanes=2, seconds=2.0, rate=100))
+    short = in_short_pieces(problem)
+    assert set(short.wholes) == set(range(4)) and len(short.trials) > 8
+    for whole, piece in zip(short.wholes, short.trials, strict=True):
+        trial = problem.trials[whole]
+        speeds = np.abs(np.gradient(trial.measurements["contraction"], trial.time))
+        at = int(np.searchsorted(trial.time, piece.time[0]))
+        assert speeds[at] >= speeds[max(at - 2, 0) : at + 2].max()
+        rows = slice(at, at + len(piece))
+        np.testing.assert_array_equal(
+            piece.measurements["contraction"], trial.measurements["contraction"][rows]
+        )
+
+
+def test_a_piece_has_what_belongs_to_its_whole_trial():
+    trials = driven_slide(12.0, lanes=2, seconds=2.0, rate=100)
+    short = in_short_pieces(problem_of(trials))
+    own = replace(DRY, own={"start.velocity_mm_per_s": [1e-3, 2e-3, 3e-3, 4e-3]})
+    whitened = short.whitened_residuals(DRY.model, (own,))
+    ((_, given),) = whitened._own
+    np.testing.assert_array_equal(given, 1e-3 * (1 + np.array(short.wholes)))
+
+
+@pytest.mark.parametrize(
+    ("differences", "chance"),
+    [([9.0, -8.0, 5.0, -3.0], True), ([4.0, 5.0, 6.0, 5.0], False), ([np.inf, 1.0], False)],
+)
+def test_fits_are_equal_where_their_difference_is_chance(differences, chance):
+    assert rugged_fits._is_by_chance(np.array(differences)) is chance
