@@ -17,6 +17,7 @@ from pma_gym.plant.model import Model, ModelError, load_model
 from pma_gym.plant.plant import Plant
 from pma_gym.plant.program import vector
 from pma_gym.plant.simulation import Run, simulate_all
+from tests.discovery.test_joint import joint
 
 FREE = (
     "sarosi_force.slope_n_per_bar",
@@ -304,3 +305,19 @@ def test_a_matrix_that_lapack_gives_up_on_is_solved_all_the_same(monkeypatch):
     np.testing.assert_allclose(least(gradient, curvature, 0.0, *room), step, rtol=1e-9)
     np.testing.assert_allclose(inverse(curvature), covariance, rtol=1e-9)
     np.testing.assert_allclose(curvature @ step, -gradient, rtol=1e-9)
+
+
+@pytest.mark.parametrize("size", [1.0, 1e-4])
+def test_an_effect_of_a_small_joint_is_fitted_as_that_of_a_large_one(size):
+    """A step of the range that the catalogue allows its damping would run away."""
+    tables = {"joint_directional_damping": {"difference_n_m_s": 0.004 * size}}
+    hidden = joint(0.02 * size, joint_damping={"coefficient_n_m_s": 0.08 * size}, **tables)
+    time = np.arange(0.0, 2.0, 0.01)
+    torque = 0.1 * size * np.sin(2.0 * np.pi * time)
+    log = Plant(hidden).simulate(Trial(time, {"torque_command": torque}), seed=1)
+    wrong = hidden.replace({"joint_directional_damping.difference_n_m_s": 0.001 * size})
+    path = "joint_directional_damping.difference_n_m_s"
+    result = fit(wrong, [log], [path])
+    (low, high) = 0.0035 * size, 0.0045 * size
+    assert low < result.parameters["joint_directional_damping.difference"] < high
+    assert result.converged

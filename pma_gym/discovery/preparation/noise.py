@@ -32,7 +32,7 @@ LEAST_REST = 12
 FEWEST_SEGMENTS = 3
 """Fewest segments that tell which of them are at rest."""
 
-MOVING, QUIETEST = 6.0, 3.0
+MOVING, QUIETEST = 4.0, 3.0
 """Spread of a segment in which something moves, over that of quiet ones; and of the quiet ones over
 the quietest, at most."""
 

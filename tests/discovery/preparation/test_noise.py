@@ -256,3 +256,18 @@ def test_what_a_lab_states_of_its_sensor_counts_before_all_else():
     assert floor.expected_step == 1e-5
     assert not is_coarse(floor)
     assert is_coarse(replace(floor, level=2e-5))
+
+
+def test_a_segment_in_which_the_rig_swings_on_is_no_rest():
+    """Its drive is constant, its motion is not; a sensor's rest is as quiet everywhere."""
+    time = np.arange(0.0, 8.0, 0.01)
+    motor = np.repeat([2.0, 3.0, 2.0, 4.0], 200)
+    rng = np.random.default_rng(7)
+    noise = 1e-5 * rng.standard_normal(time.size)
+    swing = 2e-3 * np.exp(-0.3 * time) * np.sin(9.0 * time)
+    still = logged(motor, time, 0.01 + noise)
+    swinging = logged(motor, time, 0.01 + noise + np.where(time < 4.0, swing, 0.0))
+    channel = next(c for c in CHANNELS if still.measures[c])
+    assert len(rest_readings([still], channel)) == 4
+    quiet = level_at_rest(rest_readings([swinging], channel))
+    assert quiet == pytest.approx(1e-5, rel=0.15)
