@@ -246,7 +246,7 @@ class LevenbergMarquardt:
         boundless = (self.lower > 0.0) & (width > BOUNDLESS * np.abs(values))
         # What a crane may have says nothing of a watch.
         far = (values != 0.0) & (width > TINY * np.abs(values))
-        width = np.where(far, np.maximum(np.abs(values) * np.sqrt(TINY), width / TINY), width)
+        width = np.where(far, np.maximum(np.abs(values) * np.sqrt(TINY), width / TINY**2), width)
         return np.where(boundless, np.abs(values), np.maximum(np.abs(values), width))
 
     def _held(self) -> NDArray[np.bool_]:
