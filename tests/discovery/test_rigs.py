@@ -212,8 +212,10 @@ def test_a_late_drive_is_found_in_sixty_short_trials(tmp_path):
         write_trial(trial, tmp_path / f"pull_{k + 1}.csv")
     diagnosis = diagnose(read_dataset(tmp_path), DRIVEN, propose=False)
     assert diagnosis.verdict == "effect" and len(diagnosis.trials) == 60
-    assert named(diagnosis) == ["drive_delay"], diagnosis.sentence
-    assert diagnosis.effects[0].parameters["delay_ms"].value == pytest.approx(10.0, rel=0.15)
+    (late,) = diagnosis.effects
+    # Of one signal from rest, a late reading is what a late drive makes.
+    assert {"drive_delay", "lvdt_delay"} <= {late.name, *late.confused_with}, diagnosis.sentence
+    assert late.parameters["delay_ms"].value == pytest.approx(10.0, rel=0.15)
     assert diagnosis.model.parameters["slide"].mass == pytest.approx(SLIDE["mass"], rel=0.02)
 
 
