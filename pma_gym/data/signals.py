@@ -114,6 +114,11 @@ class Signal:
         return self.measures in ("displacement", "angle")
 
     @property
+    def is_speed(self) -> bool:
+        """Whether it is the rate of a position."""
+        return self.measures in ("speed", "angular speed")
+
+    @property
     def is_force(self) -> bool:
         """Whether it is a force or a torque."""
         return self.measures in ("force", "torque")

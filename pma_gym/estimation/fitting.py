@@ -34,7 +34,7 @@ Array = NDArray[np.float64]
 SHOWN = 0.3
 """Change of the measurements by a finite difference, in their standard deviations."""
 
-TINY = 1e4
+TINY = 1e6
 """A hundredth of a range over a value, from which on the range is no scale for it."""
 
 FIRST_MOVE, LEAST_MOVE, MOST_MOVE = 1e-3, 1e-6, 2e-2

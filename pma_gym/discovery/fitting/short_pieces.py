@@ -88,12 +88,12 @@ def _is_measured(model: Model, piece: Trial) -> bool:
 def _speeds(trial: Trial) -> Array:
     """How fast a rig moves in each row; zeros where nothing tells."""
     for name, values in trial.measurements.items():
-        known, measures = np.isfinite(values), SIGNALS[name].measures
+        known = np.isfinite(values)
         if known.sum() < LEAST_ROWS // 2:
             continue
         filled = np.interp(trial.time, trial.time[known], values[known])
         if SIGNALS[name].is_position:
             return np.abs(np.gradient(filled, trial.time))
-        if measures in ("speed", "angular speed"):
+        if SIGNALS[name].is_speed:
             return np.abs(filled)
     return np.zeros(len(trial))

@@ -36,6 +36,9 @@ MOVING, QUIETEST = 4.0, 3.0
 """Spread of a segment in which something moves, over that of quiet ones; and of the quiet ones over
 the quietest, at most."""
 
+STUCK = 1e-9
+"""Spread of readings that stand still, as a share of the largest: arithmetic's."""
+
 ENOUGH = 120
 """Fewest readings at rest, over all trials, from which a noise level is taken."""
 
@@ -124,27 +127,27 @@ def rest_readings(trials: Sequence[Logged], channel: int) -> list[Array]:
                 at = np.arange(len(values), dtype=float)
                 line = np.polyfit(at[known], values[known], 1)
                 stretches.append(values - np.polyval(line, at))
-    return _at_rest(stretches)
+    return _quiet_segments(stretches)
 
 
-def _at_rest(stretches: list[Array]) -> list[Array]:
+def _quiet_segments(stretches: list[Array]) -> list[Array]:
     """Less those in which something moves: a rig that swings on while its drive is constant.
 
     They spread far more than the quieter half of the readings, and than neighbours do.
     """
-    if len(stretches) < FEWEST_SEGMENTS:
-        return stretches
     spreads = np.array([float(np.nanstd(part)) for part in stretches])
+    # A sensor that stands still tells nothing of its noise.
+    lively = np.flatnonzero(spreads > STUCK * spreads.max(initial=0.0))
+    if len(lively) < FEWEST_SEGMENTS:
+        return stretches
     counts = np.array([int(np.isfinite(part).sum()) for part in stretches])
-    order = np.argsort(spreads)
-    half = order[: 1 + int(np.searchsorted(np.cumsum(counts[order]), 0.5 * counts.sum()))]
-    quiet = np.sqrt(np.average(spreads[half] ** 2, weights=counts[half]))
-    # Through half of the readings, were most of them in motion, a quiet one would not show.
-    quiet = min(quiet, QUIETEST * float(spreads.min()) or quiet)
+    order = lively[np.argsort(spreads[lively])]
+    half = order[: 1 + int(np.searchsorted(np.cumsum(counts[order]), 0.5 * counts[order].sum()))]
+    quiet = float(np.sqrt(np.average(spreads[half] ** 2, weights=counts[half])))
+    # Were most of the readings in motion, their quieter half would be none.
+    quiet = min(quiet, QUIETEST * float(spreads[order[0]]))
     most = MOVING * max(quiet, level_of_neighbours(stretches))
-    return [
-        part for part, spread in zip(stretches, spreads.tolist(), strict=True) if spread <= most
-    ]
+    return [part for part, spread in zip(stretches, spreads, strict=True) if spread <= most]
 
 
 def level_at_rest(segments: Sequence[Array]) -> float | None:

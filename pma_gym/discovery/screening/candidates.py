@@ -12,6 +12,7 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
+from pma_gym.data.signals import SIGNALS
 from pma_gym.data.trial import Trial
 from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
 from pma_gym.discovery.fitting.free_parameters import unit, values
@@ -86,8 +87,10 @@ def _can_act(candidate: CandidateEffect, has_pressure: bool) -> bool:
     law = CATALOGUE[candidate.effect].law
     if has_pressure:
         return True
-    units = [unit(path) for path in candidate.fitted_paths]
-    pressed = law is not None and signals(law) == ("pressure", "p")
+    grown = [path for path, size in zip(candidate.paths, candidate.amplitudes, strict=True) if size]
+    units = [unit(path) for path in grown or candidate.fitted_paths]
+    pressures = {(signal.measures, "p") for signal in SIGNALS.values() if signal.is_pressure}
+    pressed = law is not None and signals(law) in pressures
     return not pressed and not all("kPa" in each or "bar" in each for each in units)
 
 

@@ -100,7 +100,8 @@ def sizes(model: Model, trials: Sequence[Trial]) -> Sizes | None:
 def _imposed(model: Model, trials: Sequence[Trial]) -> Sizes | None:
     """Of an imposed motion, whose force is what is measured."""
     motions, pressures = zip(*(sensors.voltages(model, trial) for trial in trials), strict=True)
-    forces = [trial.measurements["force"] for trial in trials if "force" in trial.measurements]
+    (force_read,) = (signal for signal in model.rig.signals if signal.is_force)
+    forces = [trial.measurements.get(force_read.name, np.empty(0)) for trial in trials]
     changes = [each - np.nanmedian(each) for each in forces if np.isfinite(each).any()]
     if not changes:
         return None
