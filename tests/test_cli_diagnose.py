@@ -93,7 +93,7 @@ def test_diagnose_writes_its_files_and_says_what_it_found(run, engine, tmp_path)
     assert names(folder) == results
     assert json.loads((folder / "diagnosis.json").read_text())["verdict"] == "parameters"
     amended = load_model(folder / "model.toml")
-    assert amended.at_the_door("drive")["gain_n_per_v"] == pytest.approx(95.02)
+    assert amended.values_in_files("drive")["gain_n_per_v"] == pytest.approx(95.02)
     assert len(read_trial(folder / "next.csv")) == 20
     assert "Seed" in (folder / "report.html").read_text()
     assert out.splitlines() == [

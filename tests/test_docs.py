@@ -81,9 +81,9 @@ def test_every_model_has_its_values_and_intervals(page, name):
             # Shown as what differs from serres2008.
             if base.get(effect) == model.parameters[effect]:
                 continue
-        for door in model.at_the_door(effect):
-            (row, *_) = (x for x in own.splitlines() if x.startswith(f"| `{effect}.{door}`"))
-            note = model.notes.get(f"{effect}.{door}")
+        for file_key in model.values_in_files(effect):
+            (row, *_) = (x for x in own.splitlines() if x.startswith(f"| `{effect}.{file_key}`"))
+            note = model.notes.get(f"{effect}.{file_key}")
             assert note is None or note.source in row
             assert note is None or note.low is None or f"{note.low:.6g} to {note.high:.6g}" in row
 

@@ -166,7 +166,7 @@ def rotor_inertia_effect(factor: float, model: str = "station", pressure: float 
         Largest difference of contraction, as a share of the step.
     """
     nominal = load_model(model)
-    inertia = nominal.at_the_door("rotor")["inertia_kg_m2"]
+    inertia = nominal.values_in_files("rotor")["inertia_kg_m2"]
     assert isinstance(inertia, float)
     changed = nominal.replace({"rotor.inertia_kg_m2": factor * inertia})
     return _largest_change(nominal, changed, pressure)

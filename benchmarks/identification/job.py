@@ -116,7 +116,7 @@ def _noted(model: Model, folds: list[dict[str, float]]) -> Model:
         notes[path] = Note(_source(path, low, high), _rounded(low, 3), _rounded(high, 3))
     notes["cable.damping_n_s_per_mm"] = Note("assumption: 2 % of critical")
     values["cable.damping_n_s_per_mm"] = _rounded(
-        model.at_the_door("cable")["damping_n_s_per_mm"]  # type: ignore[arg-type]
+        model.values_in_files("cable")["damping_n_s_per_mm"]  # type: ignore[arg-type]
     )
     rounded = model.replace(values)
     return Model(model.name, model.title, model.plant, rounded.parameters, notes)
@@ -128,9 +128,9 @@ def _possible(model: Model, path: str, low: float, high: float) -> tuple[float, 
     A value outside the bounds of another parameter has a meaning, such as a damping below 0 that
     tables do not tell from 0; a muscle cannot stand beyond the branch on which it was filled.
     """
-    effect, _, door = path.partition(".")
+    effect, _, file_key = path.partition(".")
     law = model.effects[effect]
-    if law.names_at_the_door()[door] != law.memory_start:
+    if law.names_in_files()[file_key] != law.memory_start:
         return low, high
     quantity = law.quantities[law.memory_start]
     return max(low, quantity.lower), min(high, quantity.upper)
@@ -162,8 +162,8 @@ def _print(console: Console, model: Model, folds: list[judge.LeftOut], words: li
     table = Table("parameter", "value", "low", "high", title="Identified station")
     for path, note in model.notes.items():
         if note.low is not None:
-            effect, _, door = path.partition(".")
-            value = model.at_the_door(effect)[door]
+            effect, _, file_key = path.partition(".")
+            value = model.values_in_files(effect)[file_key]
             table.add_row(path, f"{value:.5g}", f"{note.low:.3g}", f"{note.high:.3g}")
     console.print(table)
     table = Table(

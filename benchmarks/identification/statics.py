@@ -176,7 +176,7 @@ def fit(
 def _bounds(model: Model, names: list[str]) -> tuple[list[float], list[float]]:
     quantities = []
     for path in names:
-        effect, _, door = path.partition(".")
-        stem = model.effects[effect].names_at_the_door()[door]
+        effect, _, file_key = path.partition(".")
+        stem = model.effects[effect].names_in_files()[file_key]
         quantities.append(model.effects[effect].quantities[stem])
     return [q.lower for q in quantities], [q.upper for q in quantities]

@@ -29,9 +29,10 @@ def template() -> Model:
     base = load_model("serres2008")
     parameters = {n: v for n, v in base.parameters.items() if n not in _REPLACED}
     for effect, fixed in _ADDED.items():
-        quantities = CATALOGUE[effect].names_at_the_door()
+        quantities = CATALOGUE[effect].names_in_files()
         values = {
-            door: statics.PARAMETERS.get(f"{effect}.{door}", (0.0, 0.0))[0] for door in quantities
+            file_key: statics.PARAMETERS.get(f"{effect}.{file_key}", (0.0, 0.0))[0]
+            for file_key in quantities
         }
         parameters[effect] = CATALOGUE[effect].parse(values | fixed)
     notes = {p: note for p, note in base.notes.items() if not p.startswith(_REPLACED)}
@@ -95,8 +96,8 @@ _LINES = (
 
 
 def _value(model: Model, path: str) -> float:
-    effect, _, door = path.partition(".")
-    value = model.at_the_door(effect)[door]
+    effect, _, file_key = path.partition(".")
+    value = model.values_in_files(effect)[file_key]
     assert isinstance(value, float)
     return value
 

@@ -24,8 +24,8 @@ def _model() -> Iterator[tuple[str, float]]:
     except ModelError:
         return
     for path, note in model.notes.items():
-        effect, _, door = path.partition(".")
-        value = model.at_the_door(effect)[door]
+        effect, _, file_key = path.partition(".")
+        value = model.values_in_files(effect)[file_key]
         if note.low is not None and isinstance(value, float):
             yield f"station: {path}", value
 

@@ -157,7 +157,9 @@ def _stations(suite: FrozenSuite) -> list[dict[str, Any]]:
                 "station": number,
                 "effects": drawn.present,
                 "refused_draws": drawn.refused,
-                "parameters": {name: drawn.model.at_the_door(name) for name in drawn.model.effects},
+                "parameters": {
+                    name: drawn.model.values_in_files(name) for name in drawn.model.effects
+                },
             }
         )
     return entries

@@ -69,7 +69,7 @@ class Candidate:
         known = {
             f"{effect}.{name}": value
             for effect in made.parameters
-            for name, value in made.at_the_door(effect).items()
+            for name, value in made.values_in_files(effect).items()
             if isinstance(value, float | int)
         }
         return made.replace(

@@ -82,9 +82,9 @@ def _occasional(given: Mapping[str, Any]) -> Occasional:
     name, share = given["name"], given["share"]
     if name not in CATALOGUE or CATALOGUE[name].neutral is None:
         raise RecipeError(f"no effect {name!r} that a station may have or not; see the catalogue")
-    ranges = {door: tuple(ends) for door, ends in given["ranges"].items()}
-    tied = {door: (tie["to"], tie["factor"]) for door, tie in given.get("tied", {}).items()}
-    wanted, given_here = CATALOGUE[name].names_at_the_door(), [*ranges, *tied]
+    ranges = {file_key: tuple(ends) for file_key, ends in given["ranges"].items()}
+    tied = {file_key: (tie["to"], tie["factor"]) for file_key, tie in given.get("tied", {}).items()}
+    wanted, given_here = CATALOGUE[name].names_in_files(), [*ranges, *tied]
     # What has a default in model files has it here: it is not drawn.
     needed = [d for d in wanted if d in given_here or d not in CATALOGUE[name].defaults]
     if sorted(given_here) != sorted(needed) or any(to not in ranges for to, _ in tied.values()):
@@ -94,9 +94,11 @@ def _occasional(given: Mapping[str, Any]) -> Occasional:
         raise RecipeError(f"{name} needs a range or a tie for each of {needs}")
     if not 0.0 <= share <= 1.0:
         raise RecipeError(f"the share of {name} must lie in 0 to 1, got {share!r}")
-    for door, ends in ranges.items():
+    for file_key, ends in ranges.items():
         if len(ends) != 2 or ends[0] > ends[1]:
-            raise RecipeError(f"the range of {name}.{door} must be [lowest, highest], got {ends}")
+            raise RecipeError(
+                f"the range of {name}.{file_key} must be [lowest, highest], got {ends}"
+            )
         for end in ends:
-            CATALOGUE[name].quantities[wanted[door]].check(f"{name}.{door}", end)
+            CATALOGUE[name].quantities[wanted[file_key]].check(f"{name}.{file_key}", end)
     return Occasional(name, share, ranges, tied)

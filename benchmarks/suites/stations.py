@@ -92,8 +92,8 @@ def _widened(recipe: Recipe) -> Model:
 def _wider(model: Model, path: str, note: Note, widening: float) -> Note:
     if note.low is None or note.high is None:
         return note
-    effect, _, door = path.partition(".")
-    value = model.at_the_door(effect)[door]
+    effect, _, file_key = path.partition(".")
+    value = model.values_in_files(effect)[file_key]
     assert isinstance(value, float)
     low, high = (value + widening * (end - value) for end in (note.low, note.high))
     return replace(note, low=low, high=high)
@@ -109,9 +109,11 @@ def _between(ends: tuple[float, float], share: float) -> float:
 def _rounded(model: Model) -> dict[str, Value]:
     """All of a model's numbers with `DIGITS` digits, by their paths."""
     return {
-        f"{effect}.{door}": tuple(map(_short, value)) if isinstance(value, tuple) else _short(value)
+        f"{effect}.{file_key}": tuple(map(_short, value))
+        if isinstance(value, tuple)
+        else _short(value)
         for effect in model.parameters
-        for door, value in model.at_the_door(effect).items()
+        for file_key, value in model.values_in_files(effect).items()
     }
 
 

@@ -116,12 +116,12 @@ def scaled_model(model: Model, force: float, damping: float) -> Model:
     values = {}
     for name, effect in model.effects.items():
         factor = by_port.get(effect.port, 1.0)
-        stems = effect.names_at_the_door()
-        for door, value in model.at_the_door(name).items():
-            unit = effect.quantities[stems[door]].unit
+        stems = effect.names_in_files()
+        for file_key, value in model.values_in_files(name).items():
+            unit = effect.quantities[stems[file_key]].unit
             # Forces and displacements by volts; not lengths, steepness and breakpoints.
             if factor != 1.0 and (unit.startswith("N") or unit in ("m", "m/V", "m/V^2")):
-                values[f"{name}.{door}"] = _times(value, factor)
+                values[f"{name}.{file_key}"] = _times(value, factor)
     return model.replace(values)
 
 

@@ -32,12 +32,12 @@ def _parameters(model: Model, leave_out: Sequence[str] = ()) -> str:
     for effect in model.parameters:
         if effect in leave_out:
             continue
-        doors = CATALOGUE[effect].names_at_the_door()
-        for door, value in model.at_the_door(effect).items():
-            note = model.notes.get(f"{effect}.{door}", Note())
-            unit = CATALOGUE[effect].quantities[doors[door]].unit
+        file_keys = CATALOGUE[effect].names_in_files()
+        for file_key, value in model.values_in_files(effect).items():
+            note = model.notes.get(f"{effect}.{file_key}", Note())
+            unit = CATALOGUE[effect].quantities[file_keys[file_key]].unit
             cells = [_value(value), _interval(note), unit, note.source]
-            rows.append([code(f"{effect}.{door}"), *cells])
+            rows.append([code(f"{effect}.{file_key}"), *cells])
     header = ["Parameter", "Value", "95 % interval", "Unit", "Source"]
     return table(header, rows, right=(1, 2))
 

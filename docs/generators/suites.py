@@ -38,8 +38,8 @@ def occasional() -> str:
     rows = []
     for effect in recipe.effects:
         parts = [
-            f"{code(door)} {number(low)} to {number(high)}"
-            for door, (low, high) in effect.ranges.items()
+            f"{code(file_key)} {number(low)} to {number(high)}"
+            for file_key, (low, high) in effect.ranges.items()
             if low != high
         ]
         parts += [f"{code(d)} {factor:g} {code(to)}" for d, (to, factor) in effect.tied.items()]

@@ -80,11 +80,11 @@ class Column:
         line, zero = signal.calibration, signal.starts_at_zero
         return cls(signal.raw_column, "V", signal.kind, signal.name, _DAQ_RANGE, line, zero)
 
-    def to_si(self, door: NDArray[np.float64]) -> NDArray[np.float64]:
+    def to_si(self, file_key: NDArray[np.float64]) -> NDArray[np.float64]:
         """Values in SI of values in file units."""
         if self.calibration is None:
-            return door * SI_FACTORS[self.unit]
-        values = self.calibration.from_volts(door)
+            return file_key * SI_FACTORS[self.unit]
+        values = self.calibration.from_volts(file_key)
         # A potentiometer's zero is its protractor's; a trial's rotation starts at 0.
         return values - _first_measured(values) if self.starts_at_zero else values
 

@@ -130,14 +130,14 @@ class Effect:
         hints = get_type_hints(self.parameters)
         return tuple(name for name, hint in hints.items() if hint is not float)
 
-    def names_at_the_door(self) -> Mapping[str, str]:
+    def names_in_files(self) -> Mapping[str, str]:
         """Map names in files, which end in the unit, to field names: slope_n_per_kpa -> slope."""
-        return self._doors
+        return self._file_keys
 
     @cached_property
-    def _doors(self) -> Mapping[str, str]:
-        doors = {quantity.name(stem): stem for stem, quantity in self.quantities.items()}
-        return MappingProxyType(doors)
+    def _file_keys(self) -> Mapping[str, str]:
+        file_keys = {quantity.name(stem): stem for stem, quantity in self.quantities.items()}
+        return MappingProxyType(file_keys)
 
     @cached_property
     def defaults(self) -> Mapping[str, float]:
@@ -148,9 +148,12 @@ class Effect:
         {'slope': 2.0}
         """
         known = self.parameters._field_defaults
-        stems = {door: stem for door, stem in self._doors.items() if stem in known}
+        stems = {file_key: stem for file_key, stem in self._file_keys.items() if stem in known}
         return MappingProxyType(
-            {door: self.quantities[stem].from_si(known[stem]) for door, stem in stems.items()}
+            {
+                file_key: self.quantities[stem].from_si(known[stem])
+                for file_key, stem in stems.items()
+            }
         )
 
     def parse(self, values: Mapping[str, Value]) -> Parameters:
@@ -160,7 +163,7 @@ class Effect:
             ValueError: an unknown, missing or out-of-bounds parameter, with its name, value and
                 bounds.
         """
-        names = self.names_at_the_door()
+        names = self.names_in_files()
         missing = [name for name in names if name not in values and name not in self.defaults]
         unknown = [name for name in values if name not in names]
         if unknown or missing:
@@ -168,10 +171,14 @@ class Effect:
                 f"[{self.name}] takes {', '.join(names)}; unknown: {', '.join(unknown) or 'none'}, "
                 f"missing: {', '.join(missing) or 'none'}"
                 + "".join(
-                    f"; {door} may be left out ({usual:g})" for door, usual in self.defaults.items()
+                    f"; {file_key} may be left out ({usual:g})"
+                    for file_key, usual in self.defaults.items()
                 )
             )
-        given = {names[door]: self._si(door, names[door], values[door]) for door in values}
+        given = {
+            names[file_key]: self._si(file_key, names[file_key], values[file_key])
+            for file_key in values
+        }
         return self.checked(self.parameters(**given))
 
     def changed(self, parameters: Parameters, values: Mapping[str, Value]) -> Parameters:
@@ -180,8 +187,11 @@ class Effect:
         Raises:
             ValueError: an unknown or out-of-bounds parameter.
         """
-        names = self.names_at_the_door()
-        given = {names[door]: self._si(door, names[door], values[door]) for door in values}
+        names = self.names_in_files()
+        given = {
+            names[file_key]: self._si(file_key, names[file_key], values[file_key])
+            for file_key in values
+        }
         return self.checked(parameters._replace(**given))
 
     def checked(self, parameters: Parameters) -> Parameters:
@@ -202,27 +212,27 @@ class Effect:
             raise ValueError(f"{self.rows[0]} of [{self.name}] must increase from entry to entry")
         return parameters
 
-    def _si(self, door: str, stem: str, value: Value) -> Value:
+    def _si(self, file_key: str, stem: str, value: Value) -> Value:
         quantity, many = self.quantities[stem], isinstance(value, list | tuple)
         unit = "without a unit" if quantity.unit == "1" else f"in {quantity.unit}"
         if many != (stem in self.rows):
             wanted = "a list of numbers" if stem in self.rows else "one number"
-            raise ValueError(f"{self.name}.{door} must be {wanted} {unit}, got {value!r}")
+            raise ValueError(f"{self.name}.{file_key} must be {wanted} {unit}, got {value!r}")
         numbers = value if isinstance(value, list | tuple) else (value,)
         for number in numbers:
             if isinstance(number, bool) or not isinstance(number, int | float):
-                raise ValueError(f"{self.name}.{door} must be a number {unit}, got {number!r}")
-            quantity.check(f"{self.name}.{door}", number)
+                raise ValueError(f"{self.name}.{file_key} must be a number {unit}, got {number!r}")
+            quantity.check(f"{self.name}.{file_key}", number)
         converted = tuple(quantity.to_si(float(number)) for number in numbers)
         return converted if many else converted[0]
 
-    def at_the_door(self, parameters: Parameters) -> dict[str, Value]:
+    def values_in_files(self, parameters: Parameters) -> dict[str, Value]:
         """Convert parameters to values keyed by their names in files: the inverse of `parse`."""
         out: dict[str, Value] = {}
-        for door, stem in self.names_at_the_door().items():
+        for file_key, stem in self.names_in_files().items():
             value, quantity = getattr(parameters, stem), self.quantities[stem]
             many = isinstance(value, tuple)
-            out[door] = tuple(map(quantity.from_si, value)) if many else quantity.from_si(value)
+            out[file_key] = tuple(map(quantity.from_si, value)) if many else quantity.from_si(value)
         return out
 
     @property

@@ -39,8 +39,12 @@ def nominal_model(task: Task, model: Model) -> Model:
     if task.exercise is None or "leg" in model.parameters or not model.rig.balances_loads:
         return model
     leg = CATALOGUE["leg"]
-    usual = {door: leg.quantities[stem].usual for door, stem in leg.names_at_the_door().items()}
-    return model.with_effects({"leg": {door: float(value or 0.0) for door, value in usual.items()}})
+    usual = {
+        file_key: leg.quantities[stem].usual for file_key, stem in leg.names_in_files().items()
+    }
+    return model.with_effects(
+        {"leg": {file_key: float(value or 0.0) for file_key, value in usual.items()}}
+    )
 
 
 def motor_at_rest(model: Model, task: Task) -> float:

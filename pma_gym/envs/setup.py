@@ -170,10 +170,10 @@ def _model(model: Model) -> dict[str, str]:
     """A model's parameters and intervals, and the text of the effects that users brought."""
     said = {"model.plant": model.plant}
     for effect in model.parameters:
-        for door, value in model.at_the_door(effect).items():
-            note = model.notes.get(f"{effect}.{door}")
+        for file_key, value in model.values_in_files(effect).items():
+            note = model.notes.get(f"{effect}.{file_key}")
             bounds = "" if note is None or note.low is None else f" ({note.low!r}-{note.high!r})"
-            said[f"model.{effect}.{door}"] = _text(value) + bounds
+            said[f"model.{effect}.{file_key}"] = _text(value) + bounds
         text = source_of(effect)
         if text:
             said[f"model.{effect}"] = hashlib.sha256(text.encode()).hexdigest()[:12]

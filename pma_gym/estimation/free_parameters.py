@@ -36,9 +36,9 @@ def free_parameters(model: Model, paths: Sequence[str]) -> list[FreeParameter]:
     # Its message names the nearest that there is.
     model.replace({path: 0.0 for path in paths if path not in set(model.paths())})
     for path in paths:
-        effect, _, door = path.partition(".")
+        effect, _, file_key = path.partition(".")
         law = model.effects[effect]
-        stem = law.names_at_the_door()[door]
+        stem = law.names_in_files()[file_key]
         if stem in law.rows or (effect in sensors.SENSORS and stem == "noise"):
             raise ModelError(
                 f"{path} cannot be fitted: it is "

@@ -33,9 +33,9 @@ def memory_starts(model: Model) -> tuple[str, ...]:
 def memory_states(model: Model) -> dict[str, str]:
     """Paths of the parameters that give initial states, keyed by the state."""
     return {
-        state: f"{name}.{door}"
+        state: f"{name}.{file_key}"
         for name, effect in model.effects.items()
-        for door, stem in effect.names_at_the_door().items()
+        for file_key, stem in effect.names_in_files().items()
         if stem == effect.memory_start
         for state in effect.memory_names
     }

@@ -147,9 +147,9 @@ class Model:
         known = _known(effect)
         before = self.parameters.get(effect, known.neutral)
         missing = [
-            door
-            for door in known.names_at_the_door()
-            if door not in values and door not in known.defaults
+            file_key
+            for file_key in known.names_in_files()
+            if file_key not in values and file_key not in known.defaults
         ]
         if before is None and missing:
             raise ModelError(
@@ -162,24 +162,24 @@ class Model:
         except KeyError as error:
             raise ModelError(
                 f"[{effect}] has no parameter {error.args[0]}; it has "
-                f"{', '.join(known.names_at_the_door())}"
+                f"{', '.join(known.names_in_files())}"
             ) from None
         except ValueError as error:
             raise ModelError(str(error)) from error
 
-    def at_the_door(self, effect: str) -> dict[str, Value]:
+    def values_in_files(self, effect: str) -> dict[str, Value]:
         """An effect's values, keyed by their names in files."""
-        return CATALOGUE[effect].at_the_door(self.parameters[effect])
+        return CATALOGUE[effect].values_in_files(self.parameters[effect])
 
     def rows(self) -> Iterator[ParameterRow]:
         """All parameters with interval, unit and source, in the order of files."""
         for effect in self.parameters:
-            stems = CATALOGUE[effect].names_at_the_door()
-            for door, value in self.at_the_door(effect).items():
-                note = self.notes.get(f"{effect}.{door}", Note())
-                unit = CATALOGUE[effect].quantities[stems[door]].unit
+            stems = CATALOGUE[effect].names_in_files()
+            for file_key, value in self.values_in_files(effect).items():
+                note = self.notes.get(f"{effect}.{file_key}", Note())
+                unit = CATALOGUE[effect].quantities[stems[file_key]].unit
                 yield ParameterRow(
-                    effect, stems[door], value, note.low, note.high, unit, note.source
+                    effect, stems[file_key], value, note.low, note.high, unit, note.source
                 )
 
     def _repr_html_(self) -> str:
@@ -198,7 +198,7 @@ class Model:
     def paths(self) -> Iterator[str]:
         """All parameters as `effect.parameter_unit`."""
         for effect in self.parameters:
-            yield from (f"{effect}.{name}" for name in CATALOGUE[effect].names_at_the_door())
+            yield from (f"{effect}.{name}" for name in CATALOGUE[effect].names_in_files())
 
     def _nearest(self, path: str) -> str:
         near = difflib.get_close_matches(path, list(self.paths()), 1)
@@ -350,9 +350,11 @@ def _check_ports(model: Model) -> None:
             raise ModelError(f"a {rig.name} cannot have [{name}]: {rig.refused_effects[name]}")
     for part in rig.parts:
         if part not in model.parameters:
-            doors = ", ".join(CATALOGUE[part].names_at_the_door())
+            file_keys = ", ".join(CATALOGUE[part].names_in_files())
             example = rig.shipped_example
-            where = f"copy it from the shipped model {example}" if example else f"it has {doors}"
+            where = (
+                f"copy it from the shipped model {example}" if example else f"it has {file_keys}"
+            )
             raise ModelError(f"a {rig.name} needs [{part}]; {where}")
     for name, port in rig.ports.items():
         _check_port(model, name, port)
@@ -363,7 +365,7 @@ def _check_sensor(model: Model, effect: Effect) -> None:
     if effect.port.startswith(SENSOR_DELAY) and sensor not in model.parameters:
         raise ModelError(
             f"[{effect.name}] delays the readings of [{sensor}], which the model does not have; "
-            f"add [{sensor}] with {', '.join(CATALOGUE[sensor].names_at_the_door())}, or leave "
+            f"add [{sensor}] with {', '.join(CATALOGUE[sensor].names_in_files())}, or leave "
             f"[{effect.name}] out"
         )
 
@@ -384,7 +386,7 @@ def dump_model(model: Model) -> str:
     lines += [f"{key} = {toml_text(getattr(model, key))}" for key in ("name", "title", "plant")]
     for effect in model.parameters:
         lines += ["", f"[{effect}]"]
-        for name, value in model.at_the_door(effect).items():
+        for name, value in model.values_in_files(effect).items():
             lines.append(f"{name} = {_entry(value, model.notes.get(f'{effect}.{name}', Note()))}")
     return "\n".join(lines) + "\n"
 

@@ -53,7 +53,11 @@ def _brought_back(
     static = {n: e for n, e in model.effects.items() if e.law and "memory" not in signals(e.law)}
     names = [name for name, effect in static.items() if effect.port == port]
     paths = [path for path in drawn if path.partition(".")[0] in names]
-    nominal = {f"{n}.{door}": value for n in names for door, value in model.at_the_door(n).items()}
+    nominal = {
+        f"{n}.{file_key}": value
+        for n in names
+        for file_key, value in model.values_in_files(n).items()
+    }
     for _ in range(10 if paths else 0):
         if holds(model.replace({path: drawn[path] for path in paths})):
             break
@@ -108,7 +112,8 @@ def varied_station(
 def _scaled(model: Model, effect: Effect, factor: float) -> dict[str, Value]:
     """An effect's parameters in newtons, scaled; lengths and breakpoints stay."""
     paths = {
-        f"{effect.name}.{door}": value for door, value in model.at_the_door(effect.name).items()
+        f"{effect.name}.{file_key}": value
+        for file_key, value in model.values_in_files(effect.name).items()
     }
     return {
         path: _bounded(model, path, value * factor)
@@ -123,8 +128,8 @@ def _bounded(model: Model, path: str, value: float) -> float:
 
 
 def _quantity(model: Model, path: str) -> Quantity:
-    effect, _, door = path.partition(".")
-    return model.effects[effect].quantities[model.effects[effect].names_at_the_door()[door]]
+    effect, _, file_key = path.partition(".")
+    return model.effects[effect].quantities[model.effects[effect].names_in_files()[file_key]]
 
 
 Randomisation = Callable[[Model, np.random.Generator], Model]

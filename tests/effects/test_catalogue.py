@@ -184,8 +184,8 @@ def test_every_quantity_has_unit_bounds_and_source(effect):
         assert math.isfinite(quantity.lower) and math.isfinite(quantity.upper)
         if quantity.neutral is not None:
             quantity.check(name, quantity.neutral)
-    doors = effect.names_at_the_door()
-    assert len(doors) == len(effect.parameters._fields)
+    file_keys = effect.names_in_files()
+    assert len(file_keys) == len(effect.parameters._fields)
     assert effect.parameters.__doc__
     ports = {"part", *(port for rig in RIGS.values() for port in rig.ports)}
     assert effect.port in ports or measured_output(effect.port)
@@ -296,7 +296,9 @@ def test_the_middle_of_the_bounds_is_a_parameter_set(effect):
     if effect.rows:
         assert effect.name == "position_map"
         return
-    assert effect.parse(effect.at_the_door(effect.start)) == pytest.approx(effect.start, rel=1e-12)
+    assert effect.parse(effect.values_in_files(effect.start)) == pytest.approx(
+        effect.start, rel=1e-12
+    )
 
 
 @pytest.mark.parametrize("effect", CATALOGUE.values(), ids=lambda effect: effect.name)
@@ -305,7 +307,9 @@ def test_usual_values_are_a_parameter_set_that_is_there(effect):
     if effect.rows:
         return
     assert all(quantity.usual is not None for quantity in effect.quantities.values())
-    assert effect.parse(effect.at_the_door(effect.usual)) == pytest.approx(effect.usual, rel=1e-12)
+    assert effect.parse(effect.values_in_files(effect.usual)) == pytest.approx(
+        effect.usual, rel=1e-12
+    )
     assert effect.usual != effect.neutral
 
 
@@ -316,8 +320,8 @@ def test_what_a_file_need_not_name_is_usual_and_the_same_as_when_added():
         ("drive_dead_zone", {"slope": 2.0}),
     ]
     for effect in with_defaults:
-        for door, value in effect.defaults.items():
-            assert effect.quantities[effect.names_at_the_door()[door]].usual == value
+        for file_key, value in effect.defaults.items():
+            assert effect.quantities[effect.names_in_files()[file_key]].usual == value
     given = {"width_n": 15.0}
     added = load_model("station").with_effects({"drive_dead_zone": given})
     assert added.parameters["drive_dead_zone"] == CATALOGUE["drive_dead_zone"].parse(given)

@@ -305,6 +305,6 @@ def test_arrays_give_what_floats_give(effect):
 
 
 @pytest.mark.parametrize("effect", (*SPRINGS, REPPERGER_DAMPING), ids=lambda effect: effect.name)
-def test_parameters_survive_the_door(effect):
-    door = effect.at_the_door(effect.parse(NUMBERS[effect.name]))
-    assert door == pytest.approx(NUMBERS[effect.name], rel=1e-15)
+def test_parameters_survive_a_file(effect):
+    file_key = effect.values_in_files(effect.parse(NUMBERS[effect.name]))
+    assert file_key == pytest.approx(NUMBERS[effect.name], rel=1e-15)

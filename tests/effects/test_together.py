@@ -17,7 +17,7 @@ MANY = (
 
 @pytest.fixture(scope="module")
 def model():
-    usual = {name: CATALOGUE[name].at_the_door(CATALOGUE[name].usual) for name in MANY}
+    usual = {name: CATALOGUE[name].values_in_files(CATALOGUE[name].usual) for name in MANY}
     return load_model("station").with_effects(usual)
 
 

@@ -188,7 +188,7 @@ def test_plants_and_what_controllers_get_pickle(single, same):
 
 def heavier(nominal, generator, most=1.0):
     """A slide of up to twice the mass."""
-    mass = nominal.at_the_door("slide")["mass_kg"]
+    mass = nominal.values_in_files("slide")["mass_kg"]
     return nominal.replace({"slide.mass_kg": mass * (1.0 + most * generator.random())})
 
 

@@ -107,9 +107,9 @@ def test_drawn_parameters_lie_within_their_bounds_and_vary(make, uncertain, rand
     for seed in range(40):
         env.reset(seed=seed)
         drawn = env.plant.model
-        slopes.append(drawn.at_the_door("contractile_force")["slope_n_per_kpa"])
+        slopes.append(drawn.values_in_files("contractile_force")["slope_n_per_kpa"])
         for effect in drawn.effects.values():
-            effect.parse(drawn.at_the_door(effect.name))
+            effect.parse(drawn.values_in_files(effect.name))
         assert drawn.parameters["stiffness"].breakpoint == pytest.approx(314e3)
         assert drawn.parameters["limits"] == uncertain.parameters["limits"]
     share = 1.2 if randomisation == "varied" else 1.0
@@ -130,7 +130,7 @@ def test_intervals_are_met_in_all_their_width(make, uncertain):
     values = []
     for _ in range(200):
         env.reset(seed=None if values else 0)
-        values.append(env.plant.model.at_the_door("damping")["contracting_n_s_per_mm"])
+        values.append(env.plant.model.values_in_files("damping")["contracting_n_s_per_mm"])
     assert 2.0 <= min(values) < 2.1 and 3.9 < max(values) <= 4.0
     # A uniform draw's mean: 3 with a standard error of 0.04.
     assert np.mean(values) == pytest.approx(3.0, abs=0.2)
@@ -162,10 +162,10 @@ def test_varied_scales_force_as_a_whole(make):
     env.reset(seed=2)
     drawn = env.plant.model
     ratios = {
-        path: drawn.at_the_door(effect)[door] / nominal.at_the_door(effect)[door]
+        path: drawn.values_in_files(effect)[file_key] / nominal.values_in_files(effect)[file_key]
         for path in nominal.paths()
-        for effect, _, door in [path.partition(".")]
-        if nominal.at_the_door(effect)[door]
+        for effect, _, file_key in [path.partition(".")]
+        if nominal.values_in_files(effect)[file_key]
     }
     force = {
         round(ratios[p], 9)

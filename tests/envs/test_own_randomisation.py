@@ -8,7 +8,7 @@ from pma_gym.envs import PMAEnv, PMAVectorEnv
 
 def heavier(nominal, generator):
     """A slide of up to twice the mass."""
-    mass = nominal.at_the_door("slide")["mass_kg"]
+    mass = nominal.values_in_files("slide")["mass_kg"]
     return nominal.replace({"slide.mass_kg": mass * (1.0 + generator.random())})
 
 

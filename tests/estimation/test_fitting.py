@@ -27,10 +27,10 @@ FREE = (
 )
 STATION = load_model("station")
 TRUE = {
-    f"{effect}.{door}": value
+    f"{effect}.{file_key}": value
     for effect in STATION.parameters
-    for door, value in STATION.at_the_door(effect).items()
-    if f"{effect}.{door}" in FREE
+    for file_key, value in STATION.values_in_files(effect).items()
+    if f"{effect}.{file_key}" in FREE
 }
 TRUE = {path: TRUE[path] for path in FREE}
 TRUE_SI = {
@@ -265,8 +265,8 @@ def test_many_settle_as_one_does():
         motor, regulator = random.uniform(0.0, 4.0, 12), random.uniform(4.0, 9.0, 12)
         models = []
         for i, path in zip(range(12), plant.model.paths(), strict=False):
-            effect, _, door = path.partition(".")
-            value = plant.model.at_the_door(effect)[door]
+            effect, _, file_key = path.partition(".")
+            value = plant.model.values_in_files(effect)[file_key]
             models.append(plant.model.replace({path: value * (1.0 + 0.01 * i)}))
             scaled[i] = vector(models[i], plant.tolerance)
         states, zeros = solver.equilibria_at(plant, motor, regulator, np.array(scaled))

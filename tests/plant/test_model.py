@@ -49,7 +49,7 @@ def test_intervals_contain_their_values():
     assert known
     for path, note in known.items():
         effect, _, name = path.partition(".")
-        assert note.low < model.at_the_door(effect)[name] < note.high
+        assert note.low < model.values_in_files(effect)[name] < note.high
 
 
 def test_the_literatures_models_differ_from_serres2008_in_the_muscle_alone():

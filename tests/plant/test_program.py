@@ -20,7 +20,9 @@ CHANGES = ("slide.mass_kg", "rotor.inertia_kg_m2", "cable.stiffness_n_per_mm")
 def trials(count, model="station"):
     """Trials of different plants of one structure, of different lengths and commands."""
     nominal, generator = load_model(model), np.random.default_rng(count)
-    values = {name: nominal.at_the_door(name.split(".")[0])[name.split(".")[1]] for name in CHANGES}
+    values = {
+        name: nominal.values_in_files(name.split(".")[0])[name.split(".")[1]] for name in CHANGES
+    }
     runs = []
     for k in range(count):
         factors = 1.0 + 0.2 * generator.uniform(-1.0, 1.0, len(CHANGES))

@@ -22,7 +22,7 @@ def test_the_order_given_does_not_matter():
     assert dump_model(BARE.with_effects(names)) == dump_model(BARE.with_effects(names[::-1]))
 
 
-def test_values_are_given_at_the_door_and_the_rest_is_neutral():
+def test_values_are_given_as_in_files_and_the_rest_is_neutral():
     more = BARE.with_effects({"hysteresis": {"force_n": 12.0}}, name="sticky")
     assert more.name == "sticky"
     assert more.parameters["hysteresis"].force == 12.0

@@ -113,8 +113,8 @@ def _noisy(model: Model, factor: float) -> Model:
         return model
     changed = {}
     for path in NOISE:
-        effect, _, door = path.partition(".")
-        changed[path] = factor * float(model.at_the_door(effect)[door])  # type: ignore[arg-type]
+        effect, _, file_key = path.partition(".")
+        changed[path] = factor * float(model.values_in_files(effect)[file_key])  # type: ignore[arg-type]
     return model.replace(changed)
 
 

@@ -68,21 +68,21 @@ def check_signals(
         TrialError: names file, column, row, rule and mend.
     """
     # Not Column.from_si, which looks for the exact digits of a file.
-    door = {
+    file_key = {
         name: values / SI_FACTORS[BY_QUANTITY[name].unit]
         for name, values in {**trial.commands, **trial.measurements}.items()
     }
     for find in (_contraction, _pressure, _load, _rotation):
-        slip = find(door)
+        slip = find(file_key)
         if slip:
-            raise TrialError(_slip_text(path, slip, door[slip.quantity], columns, form))
+            raise TrialError(_slip_text(path, slip, file_key[slip.quantity], columns, form))
     place = partial(place_in_file, path, columns=columns, form=form)
     for quantity in ("contraction", "pressure", "pressure_command"):
         # A slide without a muscle goes as far as it likes.
-        if not SIGNALS[quantity].shortens or any(name in door for name in _MUSCLE):
-            check_possible(door, quantity, place)
+        if not SIGNALS[quantity].shortens or any(name in file_key for name in _MUSCLE):
+            check_possible(file_key, quantity, place)
     for quantity in trial.measurements:
-        _check_alive(path, quantity, door)
+        _check_alive(path, quantity, file_key)
 
 
 def empty_runs(path: Path, trial: Trial, table: Table | None = None) -> Iterator[str]:
@@ -128,33 +128,36 @@ def _largest(values: Array | None) -> float:
     return float(sizes[last - 1])
 
 
-def _moved(door: dict[str, Array], quantity: str) -> str:
+def _moved(file_key: dict[str, Array], quantity: str) -> str:
     """A command that changes so much that a measurement must follow; empty if none does."""
     drivers = _DRIVERS.get(quantity, ())
-    return next((name for name in drivers if _span(door.get(name)) >= _LARGE[name]), "")
+    return next((name for name in drivers if _span(file_key.get(name)) >= _LARGE[name]), "")
 
 
 _MUSCLE = ("regulator_voltage", "pressure_command", "pressure")
 """Of these a log of a muscle has one; a slide without a muscle goes as far as it likes."""
 
 
-def _contraction(door: dict[str, Array]) -> _Slip | None:
-    if not any(name in door for name in _MUSCLE):
+def _contraction(file_key: dict[str, Array]) -> _Slip | None:
+    if not any(name in file_key for name in _MUSCLE):
         return None
-    largest, command = _largest(door.get("contraction")), _moved(door, "contraction")
+    largest, command = _largest(file_key.get("contraction")), _moved(file_key, "contraction")
     if largest > 250.0:
         unit, factor = ("micrometres", 1e-3) if largest <= 250e3 else ("raw counts", 0.0)
         seen = f"reaches {largest:g} mm, more than any muscle of this station shortens"
         return _Slip("contraction", seen, unit, factor)
-    if command and 1e-3 < largest < 0.3 and _span(door["contraction"]) > 0.0:
-        seen = f"stays within {largest:.3g} mm of 0 although {_change(door, command)}"
+    if command and 1e-3 < largest < 0.3 and _span(file_key["contraction"]) > 0.0:
+        seen = f"stays within {largest:.3g} mm of 0 although {_change(file_key, command)}"
         return _Slip("contraction", seen, "metres", 1e3, "or its sensor was not connected")
     return None
 
 
-def _pressure(door: dict[str, Array]) -> _Slip | None:
-    measured, wished = _largest(door.get("pressure")), _largest(door.get("pressure_command"))
-    volts = _largest(door.get("regulator_voltage"))
+def _pressure(file_key: dict[str, Array]) -> _Slip | None:
+    measured, wished = (
+        _largest(file_key.get("pressure")),
+        _largest(file_key.get("pressure_command")),
+    )
+    volts = _largest(file_key.get("regulator_voltage"))
     for quantity, largest in (("pressure", measured), ("pressure_command", wished)):
         if largest > 5000.0:
             seen = f"reaches {largest:g} kPa, which is {largest / 100:g} bar"
@@ -175,12 +178,15 @@ def _pressure(door: dict[str, Array]) -> _Slip | None:
     return None
 
 
-def _load(door: dict[str, Array]) -> _Slip | None:
-    measured = _largest(door.get("load"))
-    wished = _largest(door.get("load_command"))
+def _load(file_key: dict[str, Array]) -> _Slip | None:
+    measured = _largest(file_key.get("load"))
+    wished = _largest(file_key.get("load_command"))
     asked, words = wished, "load_command_n asks for"
     if not wished:
-        asked, words = _USUAL_N_PER_V * _largest(door.get("motor_voltage")), "the motor pulls with"
+        asked, words = (
+            _USUAL_N_PER_V * _largest(file_key.get("motor_voltage")),
+            "the motor pulls with",
+        )
     if not measured or asked < 50.0:
         return None
     for unit, factor in (("kilonewtons", 1e3), ("millinewtons", 1e-3)):
@@ -190,8 +196,8 @@ def _load(door: dict[str, Array]) -> _Slip | None:
     return None
 
 
-def _rotation(door: dict[str, Array]) -> _Slip | None:
-    angle, shortened = door.get("rotation"), door.get("contraction")
+def _rotation(file_key: dict[str, Array]) -> _Slip | None:
+    angle, shortened = file_key.get("rotation"), file_key.get("contraction")
     if angle is None or shortened is None or _span(shortened) < 5.0 or not _span(angle):
         return None
     both = np.isfinite(angle) & np.isfinite(shortened)
@@ -212,22 +218,22 @@ def _rotation(door: dict[str, Array]) -> _Slip | None:
     return None
 
 
-def _check_alive(path: Path, quantity: str, door: dict[str, Array]) -> None:
+def _check_alive(path: Path, quantity: str, file_key: dict[str, Array]) -> None:
     """Refuse a measurement that never changes although what drives it does."""
-    values = door[quantity][np.isfinite(door[quantity])]
-    command = _moved(door, quantity)
+    values = file_key[quantity][np.isfinite(file_key[quantity])]
+    command = _moved(file_key, quantity)
     if values.size < _LEAST_READINGS or not command or _span(values) > 0.0:
         return
     name = BY_QUANTITY[quantity].name
     raise TrialError(
         f"{name} of {path.name} is {values[0]:g} in all {values.size} readings although "
-        f"{_change(door, command)}; if the sensor was not connected, remove the column"
+        f"{_change(file_key, command)}; if the sensor was not connected, remove the column"
     )
 
 
-def _change(door: dict[str, Array], command: str) -> str:
+def _change(file_key: dict[str, Array], command: str) -> str:
     column = BY_QUANTITY[command]
-    values = door[command]
+    values = file_key[command]
     low, high = float(np.nanmin(values)), float(np.nanmax(values))
     return f"{column.name} goes from {low:.4g} to {high:.4g} {column.unit}"
 

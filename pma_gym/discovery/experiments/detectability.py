@@ -115,9 +115,9 @@ def _usual(candidate: CandidateEffect) -> Array:
     """Values of a candidate's parameters at its usual size, in file units."""
     usual_values = []
     for path in candidate.paths:
-        effect, _, door = path.partition(".")
+        effect, _, file_key = path.partition(".")
         law = CATALOGUE[effect]
-        usual_values.append(law.quantities[law.names_at_the_door()[door]].usual)
+        usual_values.append(law.quantities[law.names_in_files()[file_key]].usual)
     absent = zip(usual_values, candidate.absent, strict=True)
     usual = np.array([other if value is None else value for value, other in absent], float)
     if np.array_equal(usual, candidate.absent):

@@ -53,7 +53,7 @@ class CandidateEffect:
         """Another model with this effect where it does nothing."""
         if self.effect in model.parameters:
             return model
-        table = self.model.at_the_door(self.effect)
+        table = self.model.values_in_files(self.effect)
         return model.with_effects({self.effect: table})
 
     def grown(self, probe: int, factor: float) -> Array:
@@ -82,6 +82,6 @@ def bounds(paths: Sequence[str]) -> tuple[Array, Array]:
 
 
 def _quantity(path: str) -> Quantity:
-    effect, _, door = path.partition(".")
+    effect, _, file_key = path.partition(".")
     law = CATALOGUE[effect]
-    return law.quantities[law.names_at_the_door()[door]]
+    return law.quantities[law.names_in_files()[file_key]]

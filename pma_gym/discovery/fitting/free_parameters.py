@@ -72,11 +72,11 @@ def free_parameters(model: Model) -> FreeParameters:
 
 def prior(model: Model, path: str) -> float:
     """Standard deviation of a parameter about the model's value, in file units."""
-    effect, _, door = path.partition(".")
+    effect, _, file_key = path.partition(".")
     law = CATALOGUE[effect]
-    value = model.at_the_door(effect)[door]
+    value = model.values_in_files(effect)[file_key]
     assert isinstance(value, float | int)
-    unit = law.quantities[law.names_at_the_door()[door]].unit
+    unit = law.quantities[law.names_in_files()[file_key]].unit
     usual = max(SHARE * abs(value), LEAST.get(unit, 0.0))
     note = model.notes.get(path)
     if note is not None and note.low is not None and note.high is not None:
@@ -88,8 +88,8 @@ def values(model: Model, paths: Sequence[str]) -> Array:
     """Values of parameters in file units."""
     numbers = []
     for path in paths:
-        effect, _, door = path.partition(".")
-        numbers.append(model.at_the_door(effect)[door])
+        effect, _, file_key = path.partition(".")
+        numbers.append(model.values_in_files(effect)[file_key])
     return np.array(numbers, float)
 
 
@@ -105,15 +105,15 @@ def at_limit(value: float, lower: float, upper: float) -> str:
 
 def unit(path: str) -> str:
     """File unit of a parameter."""
-    effect, _, door = path.partition(".")
+    effect, _, file_key = path.partition(".")
     law = CATALOGUE[effect]
-    return law.quantities[law.names_at_the_door()[door]].unit
+    return law.quantities[law.names_in_files()[file_key]].unit
 
 
 def _is_own(model: Model, path: str) -> bool:
-    effect, _, door = path.partition(".")
+    effect, _, file_key = path.partition(".")
     law = CATALOGUE[effect]
-    stem = law.names_at_the_door()[door]
+    stem = law.names_in_files()[file_key]
     if law.port == "part" and effect in ("limits", "validity"):
         return False
     if stem in law.rows or stem in law.held or effect in sensors.SENSORS:

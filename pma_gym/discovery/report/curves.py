@@ -61,7 +61,7 @@ def curves_figure(record: TrialRecord, diagnosis: Diagnosis) -> InteractiveFigur
     time = record.time.tolist()
     curves = (("measured", record.measured, ""), ("model as given", record.before, BEFORE))
     traces = [
-        Trace(label, time, _door(record, values, signal).tolist(), color)
+        Trace(label, time, _file_key(record, values, signal).tolist(), color)
         for label, values, color in (*curves, (name, record.after, AFTER))
     ]
     caption = f"{signal_name(signal)} of {record.name}: drag to zoom, click a curve to hide it."
@@ -71,8 +71,8 @@ def curves_figure(record: TrialRecord, diagnosis: Diagnosis) -> InteractiveFigur
 
 def _draw(record: TrialRecord, signal: str, above: Axes, below: Axes) -> None:
     unit = signal_unit(signal)
-    measured = _door(record, record.measured, signal)
-    before, after = (_door(record, each, signal) for each in (record.before, record.after))
+    measured = _file_key(record, record.measured, signal)
+    before, after = (_file_key(record, each, signal) for each in (record.before, record.after))
     above.plot(record.time, measured, **_measured_style(measured))
     above.plot(record.time, before, color=BEFORE, linestyle="--")
     above.plot(record.time, after, color=AFTER)
@@ -103,7 +103,7 @@ def _left_style(values: NDArray[np.float64]) -> dict[str, Any]:
     return {"marker": "o", "linestyle": "", "markersize": 4} if _sparse(values) else {}
 
 
-def _door(record: TrialRecord, values: NDArray[np.float64], signal: str) -> NDArray[np.float64]:
+def _file_key(record: TrialRecord, values: NDArray[np.float64], signal: str) -> NDArray[np.float64]:
     """One signal of an array of outputs, in its file unit."""
     column = BY_NAME[signal]
     return values[:, record.columns.index(signal)] / SI_FACTORS[column.unit]

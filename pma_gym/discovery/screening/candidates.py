@@ -111,7 +111,7 @@ def _lacking(
     needed = model.rig.needed_ports.get(effect.port)
     if needed and all(each.port != needed for each in model.effects.values()):
         return None
-    doors = {stem: door for door, stem in effect.names_at_the_door().items()}
+    file_keys = {stem: file_key for file_key, stem in effect.names_in_files().items()}
     quantities = {
         stem: quantity if sizes is None or stem in effect.held else sizes.scaled(quantity)
         for stem, quantity in effect.quantities.items()
@@ -126,9 +126,9 @@ def _lacking(
     }
     if any(quantity.usual is None for quantity in shown.values()):
         return None
-    usual = {doors[stem]: q.usual for stem, q in quantities.items() if q.usual is not None}
+    usual = {file_keys[stem]: q.usual for stem, q in quantities.items() if q.usual is not None}
     neutral = {
-        doors[stem]: quantity.neutral
+        file_keys[stem]: quantity.neutral
         for stem, quantity in shown.items()
         if quantity.neutral is not None
     }
@@ -136,15 +136,15 @@ def _lacking(
         extended = model.with_effects({effect.name: {**usual, **neutral}})
     except ModelError:
         return None
-    own = {f"{effect.name}.{doors['repeat']}": list(orders or ())} if counted else {}
-    return _candidate(effect.name, effect, extended, doors, shown, own)
+    own = {f"{effect.name}.{file_keys['repeat']}": list(orders or ())} if counted else {}
+    return _candidate(effect.name, effect, extended, file_keys, shown, own)
 
 
 def _candidate(
     name: str,
     effect: Effect,
     model: Model,
-    doors: Mapping[str, str],
+    file_keys: Mapping[str, str],
     shown: Mapping[str, Quantity],
     own: Mapping[str, Sequence[float]],
 ) -> CandidateEffect:
@@ -172,7 +172,7 @@ def _candidate(
         name,
         effect.name,
         model,
-        tuple(f"{effect.name}.{doors[stem]}" for stem in stems),
+        tuple(f"{effect.name}.{file_keys[stem]}" for stem in stems),
         np.array([stem not in switches for stem in stems]),
         absent,
         np.array([probes[k] for k in kept]),
@@ -225,7 +225,7 @@ def _at_neutral(model: Model) -> Iterator[CandidateEffect]:
     for name, effect in model.effects.items():
         if name in sensors.SENSORS or name in ("limits", "validity", "hand_push"):
             continue
-        doors = {stem: door for door, stem in effect.names_at_the_door().items()}
+        file_keys = {stem: file_key for file_key, stem in effect.names_in_files().items()}
         for stem, quantity in effect.quantities.items():
             here = getattr(model.parameters[name], stem)
             if (
@@ -237,7 +237,7 @@ def _at_neutral(model: Model) -> Iterator[CandidateEffect]:
             ):
                 continue
             alone = {stem: quantity}
-            yield _candidate(f"{name}_{stem}", effect, model, doors, alone, {})
+            yield _candidate(f"{name}_{stem}", effect, model, file_keys, alone, {})
 
 
 def _slow_sensors(model: Model) -> Iterator[CandidateEffect]:

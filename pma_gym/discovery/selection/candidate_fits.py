@@ -286,7 +286,7 @@ def without_idle(
         begun = stripped(problem, best)
         starts = {
             each.name: np.array(
-                [best.model.at_the_door(p.split(".")[0])[p.split(".")[1]] for p in each.paths],
+                [best.model.values_in_files(p.split(".")[0])[p.split(".")[1]] for p in each.paths],
                 float,
             )
             for each in others

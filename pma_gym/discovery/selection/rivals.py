@@ -89,6 +89,6 @@ def _start(candidate: CandidateEffect, *fits: Fitted) -> np.ndarray:
     """Values of a candidate's parameters in the last of some fits that has it."""
     for fit in reversed(fits):
         if candidate.effect in fit.model.parameters and candidate.name in fit.names:
-            table = fit.model.at_the_door(candidate.effect)
+            table = fit.model.values_in_files(candidate.effect)
             return np.array([table[path.partition(".")[2]] for path in candidate.paths], float)
     return candidate.probes[0]

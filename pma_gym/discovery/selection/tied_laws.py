@@ -56,8 +56,8 @@ class Tie:
 
 def ties(candidate: CandidateEffect) -> Iterator[Tie]:
     """The simpler laws of an effect whose parameters are fitted."""
-    doors = CATALOGUE[candidate.effect].names_at_the_door()
-    stems = {doors[path.partition(".")[2]]: path for path in candidate.fitted_paths}
+    file_keys = CATALOGUE[candidate.effect].names_in_files()
+    stems = {file_keys[path.partition(".")[2]]: path for path in candidate.fitted_paths}
     for one, other, *idle in CATALOGUE[candidate.effect].ties:
         if one in stems and other in stems:
             rest = tuple(stems[stem] for stem in idle if stem in stems)

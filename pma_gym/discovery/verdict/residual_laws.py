@@ -75,7 +75,7 @@ def estimated_laws(problem: FitProblem, refitted: Fitted) -> list[EstimatedLaw]:
 def residual_law(drawn: EstimatedLaw) -> ResidualLaw:
     """A law as the report shows it, less what is a straight line or a constant of the model's."""
     quantity, variable, _ = LAWS[drawn.name]
-    table = drawn.fit.model.at_the_door(drawn.name)
+    table = drawn.fit.model.values_in_files(drawn.name)
     first, reach = (float(value) for value in list(table.values())[:2])  # type: ignore[arg-type]
     at = np.linspace(first, first + reach, len(drawn.candidate.fitted_paths))
     places = [drawn.fit.paths.index(path) for path in drawn.candidate.fitted_paths]
@@ -157,15 +157,15 @@ def _ranges(problem: FitProblem, refitted: Fitted) -> dict[str, tuple[float, flo
 def _candidate(problem: FitProblem, name: str, ends: tuple[float, float]) -> CandidateEffect:
     """A law that does nothing, between its ends."""
     effect = CATALOGUE[name]
-    doors = list(effect.names_at_the_door())
-    heights = doors[2:]
-    table = dict(zip(doors, (ends[0], ends[1] - ends[0], *([0.0] * len(heights))), strict=True))
+    file_keys = list(effect.names_in_files())
+    heights = file_keys[2:]
+    table = dict(zip(file_keys, (ends[0], ends[1] - ends[0], *([0.0] * len(heights))), strict=True))
     zero = np.zeros(len(heights))
     return CandidateEffect(
         name,
         name,
         problem.given.with_effects({name: table}),
-        tuple(f"{name}.{door}" for door in heights),
+        tuple(f"{name}.{file_key}" for file_key in heights),
         np.ones(len(heights), bool),
         zero,
         np.eye(len(heights)),

@@ -145,7 +145,7 @@ def model_with(lab, name):
         return lab.replace({f"{sensor}.bandwidth_hz": values["bandwidth_hz"]})
     if name not in CATALOGUE:
         return None
-    doors = CATALOGUE[name].names_at_the_door()
+    file_keys = CATALOGUE[name].names_in_files()
     defaults = {
         "resting_length_mm": 250.0,
         "resting_diameter_mm": 20.0,
@@ -155,7 +155,7 @@ def model_with(lab, name):
         "stiffness_n_per_mm": 20.0,
     }
     given = {**defaults, **values}
-    return lab.with_effects({name: {d: given[d] for d in doors if d in given}})
+    return lab.with_effects({name: {d: given[d] for d in file_keys if d in given}})
 
 
 @pytest.mark.parametrize("name", KINDS)

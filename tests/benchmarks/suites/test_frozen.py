@@ -74,7 +74,7 @@ def acting(model):
         if not neutral or any(getattr(values, stem) != zero for stem, zero in neutral.items()):
             # A parameter that the catalogue got later is as if it were not there.
             later = effect.defaults.items()
-            parameters = model.at_the_door(name)
+            parameters = model.values_in_files(name)
             yield name, dict(pair for pair in parameters.items() if pair not in later)
 
 

@@ -20,7 +20,7 @@ GAIN = "drive.gain_n_per_v"
 @cache
 def strong_drive(factor):
     """Trials of a station whose drive is so many times as strong as its model says."""
-    gain = factor * STATION.at_the_door("drive")["gain_n_per_v"]
+    gain = factor * STATION.values_in_files("drive")["gain_n_per_v"]
     kinds = {"kinds": (0, 0), "kpa": (400.0, 520.0)}
     return measured(STATION.replace({GAIN: gain}), 2, rate=32.0, **kinds), gain
 

@@ -117,7 +117,7 @@ def test_curvature_is_that_of_chi_square_where_the_model_is_right(smooth):
 
 
 def test_values_of_its_own_change_a_trial_alone(trials):
-    here = 1e-3 * STATION.at_the_door("rotor")["radius_mm"]
+    here = 1e-3 * STATION.values_in_files("rotor")["radius_mm"]
     plain, own = (
         whitened_residuals(trials, own={"rotor.radius_mm": row}).pieces(
             whitened_residuals(trials).start, STEPS

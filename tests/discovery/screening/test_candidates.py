@@ -173,7 +173,7 @@ def test_beside_another_model_keeps_its_parameters():
     off = STATION.replace(OFF)
     for candidate in CANDIDATES:
         beside = candidate.beside(off)
-        assert beside.at_the_door("drive")["gain_n_per_v"] == OFF["drive.gain_n_per_v"]
+        assert beside.values_in_files("drive")["gain_n_per_v"] == OFF["drive.gain_n_per_v"]
         assert candidate.effect in beside.parameters
 
 

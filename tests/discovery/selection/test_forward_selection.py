@@ -44,7 +44,7 @@ def test_parameters_come_right_only_beside_the_effect():
         value, error = stage.fit.estimate(path)
         assert abs(value - truth) < 3.5 * error
     # Damping takes what hysteresis loses, as long as that is missing.
-    truth = STATION.at_the_door("damping")["contracting_n_s_per_mm"]
+    truth = STATION.values_in_files("damping")["contracting_n_s_per_mm"]
     wrong, right = (
         abs(fit.estimate("damping.contracting_n_s_per_mm")[0] - truth)
         for fit in (refitted, stage.fit)
@@ -105,8 +105,11 @@ def test_a_fit_comes_back_from_its_journal_bit_by_bit():
     assert np.array_equal(again.values, fit.values)
     assert again.chi_square == fit.chi_square
     for path in fit.paths:
-        effect, _, door = path.partition(".")
-        assert again.model.at_the_door(effect)[door] == fit.model.at_the_door(effect)[door]
+        effect, _, file_key = path.partition(".")
+        assert (
+            again.model.values_in_files(effect)[file_key]
+            == fit.model.values_in_files(effect)[file_key]
+        )
 
 
 def test_a_delay_comes_back_from_its_journal_switched_on():
@@ -114,8 +117,10 @@ def test_a_delay_comes_back_from_its_journal_switched_on():
     delay = next(each for each in CANDIDATES if each.name == "regulator_delay")
     fit = shared.fit(refitted.model, (delay,), {"regulator_delay": delay.probes[0]})
     again = restored(kept_form(fit), shared, refitted, (delay,))
-    assert again.model.at_the_door("regulator_delay") == fit.model.at_the_door("regulator_delay")
-    assert again.model.at_the_door("regulator_delay")["share"] == 1.0
+    assert again.model.values_in_files("regulator_delay") == fit.model.values_in_files(
+        "regulator_delay"
+    )
+    assert again.model.values_in_files("regulator_delay")["share"] == 1.0
 
 
 def test_the_truth_is_hardly_better_than_what_was_found():
@@ -131,8 +136,8 @@ def test_the_truth_is_hardly_better_than_what_was_found():
 
 
 def _value(model, path):
-    effect, _, door = path.partition(".")
-    return model.at_the_door(effect)[door]
+    effect, _, file_key = path.partition(".")
+    return model.values_in_files(effect)[file_key]
 
 
 def taut(effects, rate=128.0):

@@ -90,7 +90,7 @@ def test_a_speed_beyond_all_speeds_is_only_known_to_lie_above():
     logs, truth = rubbing(12.0, 4.0, 900.0)
     noise = (white_noise(2e-4),) * 2
     bench = FitProblem(logs, SLIDE, free_parameters(SLIDE), noise)
-    table = truth.at_the_door("coulomb_friction")
+    table = truth.values_in_files("coulomb_friction")
     begun = np.array([table[path.partition(".")[2]] for path in DRY.paths], float)
     fit = bench.fit(SLIDE, (DRY,), {DRY.name: begun})
     assert fit is not None

@@ -66,7 +66,9 @@ def test_parameters_that_are_off_are_named():
         half = 0.5 * (moved.now.high - moved.now.low)
         assert abs(moved.now.value - truth) < 2.0 * half
         assert path in diagnosis.sentence
-    assert diagnosis.model.at_the_door("drive")["gain_n_per_v"] == pytest.approx(101.0, rel=2e-3)
+    assert diagnosis.model.values_in_files("drive")["gain_n_per_v"] == pytest.approx(
+        101.0, rel=2e-3
+    )
 
 
 def test_only_what_moved_is_significant():
@@ -385,8 +387,8 @@ def test_every_candidate_is_accounted_for():
 
 
 def _given(path):
-    effect, _, door = path.partition(".")
-    return STATION.at_the_door(effect)[door]
+    effect, _, file_key = path.partition(".")
+    return STATION.values_in_files(effect)[file_key]
 
 
 def test_the_widest_scatter_is_over_all_effects_and_conditions(same_size):
