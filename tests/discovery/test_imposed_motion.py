@@ -76,3 +76,11 @@ def test_nothing_hidden_names_nothing():
     diagnosis = diagnose(given, imposed(force_sensor=SENSOR, **spring), propose=False)
     assert not diagnosis.effects, diagnosis.sentence
     assert diagnosis.verdict in ("agrees", "parameters", "undecidable")
+
+
+def test_backlash_that_nothing_could_show_is_no_reason_to_decide_nothing():
+    """Without friction no way is lost, however large the gap: it is not counted as hidden."""
+    diagnosis = diagnose(trials(), KNOWN, propose=False)
+    assert "backlash" in {each.name for each in diagnosis.candidates}
+    assert "backlash" not in diagnosis.not_detectable
+    assert diagnosis.verdict != "effect"

@@ -29,12 +29,12 @@ FIRST_REST_S = 0.1
 LEAST_REST = 12
 """Fewest readings of a segment."""
 
-FEWEST_SEGMENTS = 3
-"""Fewest segments that tell which of them are at rest."""
+LEAST_SEGMENTS = 3
+"""Least number of segments that show which of them are at rest."""
 
 MOVING, QUIETEST = 4.0, 3.0
 """Spread of a segment in which something moves, over that of quiet ones; and of the quiet ones over
-the quietest, at most."""
+the quietest, at most. Both are assumptions."""
 
 STUCK = 1e-9
 """Spread of readings that stand still, as a share of the largest: arithmetic's."""
@@ -136,12 +136,12 @@ def _quiet_segments(stretches: list[Array]) -> list[Array]:
     They spread far more than the quieter half of the readings, and than neighbours do.
     """
     spreads = np.array([float(np.nanstd(part)) for part in stretches])
-    # A sensor that stands still tells nothing of its noise.
-    lively = np.flatnonzero(spreads > STUCK * spreads.max(initial=0.0))
-    if len(lively) < FEWEST_SEGMENTS:
+    # A sensor that stands still shows no noise.
+    noisy = np.flatnonzero(spreads > STUCK * spreads.max(initial=0.0))
+    if len(noisy) < LEAST_SEGMENTS:
         return stretches
     counts = np.array([int(np.isfinite(part).sum()) for part in stretches])
-    order = lively[np.argsort(spreads[lively])]
+    order = noisy[np.argsort(spreads[noisy])]
     half = order[: 1 + int(np.searchsorted(np.cumsum(counts[order]), 0.5 * counts[order].sum()))]
     quiet = float(np.sqrt(np.average(spreads[half] ** 2, weights=counts[half])))
     # Were most of the readings in motion, their quieter half would be none.

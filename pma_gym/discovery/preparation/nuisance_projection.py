@@ -25,8 +25,8 @@ LEAST_COSINES, MOST_COSINES = 2, 4
 """Least and greatest number of cosines of a drift; the least is one period a trial."""
 
 WANDER, MOST_TURNS = 4e-4, 24
-"""How far a line's frequency is off in a trial, as a share of it: mains wander by 20 mHz, as an
-assumption of ours. And how many half turns of that a trial gives it at most."""
+"""How far a line's frequency is off in a trial, as a share of it, and how many half turns of that a
+trial gives it at most. An assumption: the frequency of mains changes by 20 mHz."""
 
 LEAKS = 2
 """Half turns beyond those that a line's wandering may have."""

@@ -49,8 +49,8 @@ LEAST_CHANGE = 0.15
 most: what is smaller is not worth a name, and no model's arithmetic is that exact."""
 
 PIECES_CHANGE = 0.05
-"""The same of pieces with a start of their own each: it takes up most of what an effect does in the
-whole trial."""
+"""The same of pieces of a trial, each with its own start: that takes up most of what an effect does
+in the whole trial. An assumption: friction or a spring as large as the noise shows so little."""
 
 COARSE_CHANGE = 0.5
 """The same beside a sensor whose readings keep to coarse steps: what is lost between them is no

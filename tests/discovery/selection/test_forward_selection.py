@@ -1,14 +1,18 @@
 """Selection: what is hidden is found, what is not is not, and what is chosen fits."""
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
 import pytest
 
 from pma_gym.data.trial import Trial
+from pma_gym.discovery.fitting.fit_problem import FitProblem
+from pma_gym.discovery.fitting.free_parameters import free_parameters
 from pma_gym.discovery.fitting.journal import Journal
 from pma_gym.discovery.screening.candidates import candidate_effects
 from pma_gym.discovery.screening.residuals import is_autocorrelated, scan_of_fit
+from pma_gym.discovery.screening.score_test import ScreeningScore
 from pma_gym.discovery.selection import forward_selection
 from pma_gym.discovery.selection.candidate_fits import cost, kept_form, restored
 from pma_gym.discovery.selection.forward_selection import ALARM, passes, select
@@ -203,3 +207,15 @@ def test_noise_larger_in_places_bursts_but_names_nothing(monkeypatch):
         selection.chosen == () and selection.stages[0].gate == () and selection.stages[0].fits == {}
     )
     assert all(each.p_value > 1e-3 for each in selection.stages[0].scores)
+
+
+@pytest.mark.parametrize(("change", "whole", "pieces"), [(0.3, 1, 1), (0.08, 0, 1), (0.03, 0, 0)])
+def test_in_pieces_of_one_file_a_smaller_change_counts(change, whole, pieces):
+    """Each piece has a start of its own, which takes up most of what an effect does."""
+    candidate = candidate_effects(STATION)[0]
+    score = ScreeningScore(candidate, 99.0, 0.0005, 0, 1.0, change, None, ())
+    trials = commanded(2)
+    own = free_parameters(STATION)
+    problem = FitProblem(trials, STATION, own, (), files=("one", "other"))
+    assert passes(problem, score) == bool(whole)
+    assert passes(replace(problem, files=("one", "one")), score) == bool(pieces)
