@@ -35,7 +35,8 @@ def hidden_effects(
     block: Annotated[
         str,
         typer.Option(
-            help="single, faint, nothing, parameters, pair, unknown, undecidable, rigs, or all."
+            help="single, faint, nothing, parameters, pair, unknown, slow_drift, undecidable, "
+            "rigs, or all; single_ and nothing_ with hum, drift, coloured or outliers."
         ),
     ],
     n: Annotated[int, typer.Option("--n", min=1, help="Cases of a block; more extend the set.")],

@@ -272,6 +272,8 @@ def _missed(outcome: Outcome) -> bool:
         return outcome.verdict != "unknown"
     if outcome.block == "rigs" and outcome.truth:
         return not outcome.near or outcome.hits < len(outcome.truth) - 1 or outcome.false_structure
+    if outcome.block == "slow_drift":
+        return not (outcome.near or outcome.verdict == "unknown")
     if outcome.block.startswith("single") or outcome.block in ("faint", "pair"):
         return not outcome.right
     if outcome.block in ("unknown", "undecidable"):

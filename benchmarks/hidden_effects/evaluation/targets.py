@@ -88,6 +88,13 @@ _NOTHING_UGLY = (
     Rate("a false name", lambda o: o.verdict == "effect"),
 )
 
+_SLOW_DRIFT = (
+    Rate("said to agree", lambda o: o.verdict == "agrees", Target(most=0.02)),
+    Rate("said to be of right structure", lambda o: o.verdict in RIGHT_STRUCTURE),
+    Rate("right or in its group, or unknown", lambda o: o.near or o.verdict == "unknown"),
+    Rate("a false name", lambda o: o.wrong),
+)
+
 _PARAMETERS = (
     Rate("right parameter named", lambda o: o.parameters, Target(least=0.95)),
     Rate("a new effect claimed", lambda o: o.detected, Target(most=0.02)),
@@ -162,6 +169,7 @@ RATES: dict[str, tuple[Rate, ...]] = {
     "unknown": _UNKNOWN,
     **{f"single_{ugly}": _SINGLE_UGLY for ugly in UGLY},
     **{f"nothing_{ugly}": _NOTHING_UGLY for ugly in UGLY},
+    "slow_drift": _SLOW_DRIFT,
     "undecidable": _UNDECIDABLE,
     "rigs": _RIGS,
 }

@@ -48,6 +48,7 @@ BLOCKS: dict[str, Block] = {
         Block("unknown", tuple(OUTSIDE)),
         *(Block(f"single_{ugly}", tuple(KINDS), ugly=ugly) for ugly in UGLY),
         *(Block(f"nothing_{ugly}", ugly=ugly) for ugly in UGLY),
+        Block("slow_drift", ("creep", "leakage", "warm_up"), ugly="drift"),
     )
 }
 """By name, in the order of the table."""

@@ -315,5 +315,14 @@ OUTSIDE: dict[str, Kind] = {
 }
 """Effects that no catalogue has, by name."""
 
-ALL = KINDS | OUTSIDE
+LEAKAGE: dict[str, Kind] = {
+    "leakage": Kind(
+        lambda g, most: {"rate_per_s": _log(g, 0.02, 0.2), "opening_s": _log(g, 2.0, 10.0)},
+        ("rate_per_s",),
+        lambda p: valve.OpeningLeak(p["rate_per_s"], one(p["opening_s"])),
+    ),
+}
+"""Effects outside the catalogue that only block `slow_drift` hides."""
+
+ALL = KINDS | OUTSIDE | LEAKAGE
 LAGS = {f"{sensor}_lag" for sensor in SENSORS}

@@ -80,3 +80,25 @@ class Squeeze(Hidden):
         width2 = np.maximum(self.thread2 - length * length, 1e-6)
         growth = 2.0 * length / width2 - 1.0 / length
         return -self.exponent * (moment.pressure + ATMOSPHERE) * growth * moment.velocity
+
+
+class OpeningLeak(Hidden):
+    """Air escapes in proportion to the absolute pressure, through a leak that opens in a trial.
+
+    A leak that is the same at all times changes a regulator of first order into another one of
+    first order; one that opens as its seal gives way does not.
+    """
+
+    def __init__(self, rate: Array, opening: float) -> None:
+        """Take rates (1/s) of all lanes, and the time constant (s) with which the leak opens."""
+        self.rate, self.opening, self.time = rate, opening, 0.0
+
+    def begin(self, moment: Moment) -> None:
+        """Close the leak."""
+        self.time = 0.0
+
+    def chamber(self, moment: Moment) -> Array:
+        """Rate of the pressure by the air that escapes."""
+        self.time += moment.step
+        opened = -np.expm1(-self.time / self.opening)
+        return -self.rate * opened * (moment.pressure + ATMOSPHERE)

@@ -10,6 +10,7 @@ from benchmarks.hidden_effects import physics
 from benchmarks.hidden_effects.evaluation import diagnosed_cases, scoring
 from benchmarks.hidden_effects.evaluation.verdicts import judged
 from benchmarks.hidden_effects.generation import drawing, files
+from benchmarks.hidden_effects.generation.blocks import BLOCKS as DRAWN
 from benchmarks.hidden_effects.generation.blocks import Block
 from benchmarks.hidden_effects.generation.cases import BLOCKS, draw_case
 from benchmarks.hidden_effects.generation.effect_size import simulate_variants
@@ -178,6 +179,19 @@ def test_an_effect_of_size_0_is_absent(commands):
     assert np.abs((with_all - plain) / noise_levels(np.ones(4))).max() < 1e-6
 
 
+def test_a_leak_lowers_the_pressure_as_far_as_the_regulator_lets_it():
+    """At rest (asked - p) / tau = k (p + 1 atm), once the leak is open; before, nothing leaks."""
+    rows = int(4.0 * RATE)
+    still = Commands(np.full((1, rows), 1.0), np.full((1, rows), 4.0), np.zeros(1))
+    leak = {"leakage": {"rate_per_s": 0.2, "opening_s": 0.4}}
+    tight, leaking = simulate_variants(still, [(NOMINAL, {}), (NOMINAL, leak)])
+    tau = NOMINAL["regulator_time"]
+    asked = tight[0, -1, 3]
+    drop = tau * 0.2 * (asked + 101325.0) / (1.0 + tau * 0.2)
+    assert leaking[0, 0, 3] == pytest.approx(tight[0, 0, 3], abs=100.0)
+    assert asked - leaking[0, -1, 3] == pytest.approx(drop, rel=5e-3)
+
+
 def test_the_simulation_imports_nothing_of_the_package():
     folder = Path(physics.__file__).parent
     generation = folder.parent / "generation"
@@ -270,6 +284,12 @@ def test_trials_stay_within_what_the_rig_bears():
     for readings in draw_case(11, 0, "parameters", seconds=4.0).readings:
         assert -9.0 < readings[:, 0].min() and readings[:, 0].max() < 70.0
         assert readings[:, 2].max() < 1150.0 and readings[:, 3].max() < 570.0
+
+
+def test_slow_effects_hide_under_a_drift():
+    truths = [DRAWN["slow_drift"].draw(11, number).truth for number in (1, 2, 3)]
+    assert [t["effects"][0]["name"] for t in truths] == ["creep", "leakage", "warm_up"]
+    assert all(t["readout_noise"]["kind"] == "drift" and not t["weak"] for t in truths)
 
 
 def test_groups_are_small_and_known():
