@@ -77,18 +77,21 @@ class Whitening:
     waves: int = 0
 
     def white(self, series: Array, missing: NDArray[np.int64]) -> Array:
-        """Whitened series, shape (..., rows); 0 where a reading that it needs is missing."""
+        """Whitened series, shape (..., rows); 0 where a reading is missing.
+
+        A reading without a whole past counts by the level alone, as the first ones do.
+        """
         white = series / self.innovation
         # Lag by lag: SciPy's filter without feedback goes through the series one by one.
         for lag, share in enumerate(self.coefficients, 1):
             white[..., lag:] -= (share / self.innovation) * series[..., :-lag]
         order = len(self.coefficients)
-        if order:
-            # The first readings have no past: by the level alone.
-            white[..., :order] = series[..., :order] / self.level
-        for lag in range(order + 1):
-            later = missing + lag
-            white[..., later[later < series.shape[-1]]] = 0.0
+        rows = np.arange(series.shape[-1])
+        alone = [rows[:order], *(missing + lag for lag in range(1, order + 1))]
+        alone = np.unique(np.concatenate(alone))
+        alone = alone[alone < len(rows)]
+        white[..., alone] = series[..., alone] / self.level
+        white[..., missing] = 0.0
         return white
 
 

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from pma_gym.data.datasets.dataset import NamedTrial
 from pma_gym.data.trial import Trial
+from pma_gym.discovery.preparation.noise import level_of_neighbours
 
 Array = NDArray[np.float64]
 
@@ -34,11 +35,14 @@ SAME = 1e-3
 """Share of the rows' distance within which two times are one."""
 
 WORTH = 0.5
-"""Most rows that a trial may keep, as a share of its own: a command that changes in every row, as a
-noisy controller's does, needs them all, and averages of readings would only hide the fastest."""
+"""Most rows that trials of one rate may keep, as a share of their own: a command that changes in
+every row, as a noisy controller's does, needs them all, and averages of readings would only hide
+the fastest. Trials of one rate are averaged all or none, for they share one noise."""
 
-CURVATURE = 1e-4
-"""Largest change of a command by leaving rows out, as a share of its span."""
+CURVATURE, UNSEEN = 1e-4, 0.25
+"""Largest change of a command by leaving rows out, as a share of its span: so much at most, and so
+much of the share that the noise of a reading has of the reading's span. An encoder that tells a
+millionth of its way tells a command that is off by more."""
 
 
 def averaged(named: Sequence[NamedTrial]) -> tuple[list[NamedTrial], list[str]]:
@@ -53,15 +57,17 @@ def averaged(named: Sequence[NamedTrial]) -> tuple[list[NamedTrial], list[str]]:
     if total <= MOST_ROWS:
         return list(named), []
     wanted = math.ceil(total / AIM_ROWS)
-    kept, factors = [], []
-    for each in named:
-        rate = 1.0 / float(np.median(np.diff(each.trial.time)))
-        factor = max(1, min(wanted, int(rate / SLOWEST_HZ)))
-        factors.append(factor)
-        fewer = each.trial if factor == 1 else _fewer(each.trial, factor)
-        if len(fewer) > WORTH * len(each.trial):
-            fewer, factors[-1] = each.trial, 1
-        kept.append(replace(each, trial=fewer))
+    factors = [max(1, min(wanted, int(_rate(each.trial) / SLOWEST_HZ))) for each in named]
+    kept, off = list(named), _unseen(named)
+    for factor in sorted(set(factors) - {1}):
+        of_rate = [k for k, each in enumerate(factors) if each == factor]
+        fewer = {k: _fewer(named[k].trial, factor, off) for k in of_rate}
+        rows = sum(len(named[k].trial) for k in of_rate)
+        if sum(map(len, fewer.values())) > WORTH * rows:
+            factors = [1 if each == factor else each for each in factors]
+            continue
+        for k, trial in fewer.items():
+            kept[k] = replace(named[k], trial=trial)
     left = sum(len(each.trial) for each in kept)
     if max(factors) == 1:
         return list(named), []
@@ -69,18 +75,41 @@ def averaged(named: Sequence[NamedTrial]) -> tuple[list[NamedTrial], list[str]]:
     how = f"{most}" if least == most else f"{least} to {most}"
     trials = f"the {len(named)} trials have" if len(named) > 1 else "the trial has"
     return kept, [
-        f"{trials} {total} rows: readings are averaged over {how} rows each, "
-        f"which leaves {left}; commands are kept to 0.01 % of their range. What is faster "
+        f"{trials} {total} rows: readings are averaged over {how} rows each, which leaves {left}; "
+        f"commands are kept to {100.0 * off:.1g} % of their range. What is faster "
         "than that is not looked for: cut the log to the part that matters if you need it"
     ]
 
 
-def _fewer(trial: Trial, factor: int) -> Trial:
-    """A trial with a reading for each block of rows, at the block's middle in time."""
+def _rate(trial: Trial) -> float:
+    """Rows a second."""
+    return 1.0 / float(np.median(np.diff(trial.time)))
+
+
+def _unseen(named: Sequence[NamedTrial]) -> float:
+    """By which share of its span a command may be off without any reading showing it."""
+    shares = []
+    for name in {name for each in named for name in each.trial.measurements}:
+        parts = [each.trial.measurements[name] for each in named if name in each.trial.measurements]
+        known = np.concatenate(parts)
+        known = known[np.isfinite(known)]
+        if known.size and np.ptp(known) > 0.0:
+            shares.append(level_of_neighbours(parts) / float(np.ptp(known)))
+    return min([CURVATURE, *(UNSEEN * share for share in shares if share > 0.0)])
+
+
+def _fewer(trial: Trial, factor: int, off: float) -> Trial:
+    """A trial with a reading for each block of rows, at the block's middle in time.
+
+    Args:
+        trial: the trial.
+        factor: rows of a block.
+        off: by which share of its span a command may change.
+    """
     blocks = len(trial) // factor
     inner = np.arange(blocks * factor).reshape(blocks, factor)
     middles = _middles(trial.time[inner])
-    extra = _bends(trial, middles)
+    extra = _bends(trial, middles, off)
     time = np.unique(np.concatenate([trial.time[:1], middles, trial.time[extra]]))
     commands = {name: _interpolated(trial.time, row, time) for name, row in trial.commands.items()}
     at = np.searchsorted(time, middles)
@@ -119,7 +148,7 @@ def _interpolated(time: Array, row: Array, at: Array) -> Array:
     return np.interp(at, time, row[last])
 
 
-def _bends(trial: Trial, times: Array) -> NDArray[np.int64]:
+def _bends(trial: Trial, times: Array, share: float) -> NDArray[np.int64]:
     """Rows that commands need beside some times, so that joining them gives what they were."""
     needed: set[int] = set()
     for row in trial.commands.values():
@@ -130,7 +159,7 @@ def _bends(trial: Trial, times: Array) -> NDArray[np.int64]:
         knots = np.unique(np.concatenate([trial.time[[0, -1]], times]))
         for _ in range(8):
             drawn = np.interp(trial.time, knots, np.interp(knots, trial.time, values))
-            off = np.abs(drawn - values) > CURVATURE * span
+            off = np.abs(drawn - values) > share * span
             if not off.any():
                 break
             added = np.flatnonzero(off)
