@@ -276,7 +276,9 @@ class _Work:
         stated = Stated()
         if isinstance(self.asked, Dataset):
             stated = Stated(self.asked.tolerance, self.asked.standard_error)
-        floors = acceptance_floors(logged, findings.named, stated)
+        pairs = zip(logged[0].signals, problem.noise, strict=True)
+        humming = {signal.name for signal, noise in pairs if noise.lines}
+        floors = acceptance_floors(logged, findings.named, stated, humming)
         whitened = problem.whitened_residuals(fit.model, findings.selection.chosen)
         held = whitened.readings(fit.values)
         assert held is not None

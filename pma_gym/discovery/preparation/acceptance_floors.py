@@ -7,7 +7,7 @@ floor for an open-loop simulation. Of a summary (a few readings a trial) the sta
 lab prints stands in the place of rest segments.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -64,28 +64,37 @@ class AcceptanceFloor:
 
 
 def acceptance_floors(
-    logged: Sequence[Logged], named: Sequence[NamedTrial], stated: Stated
+    logged: Sequence[Logged],
+    named: Sequence[NamedTrial],
+    stated: Stated,
+    humming: Collection[str] = (),
 ) -> dict[str, AcceptanceFloor]:
     """The floor of every signal that has one, by output.
+
+    Two repeats that begin at about the same phase of mains share their hum: a signal that hums
+    scatters at least as much as it does at rest.
 
     Args:
         logged: the trials as they are read.
         named: the same, with what is known of repeats.
         stated: what the lab states.
+        humming: signals that have lines of mains.
     """
     floors = {}
     for channel, signal in enumerate(logged[0].signals):
         name = signal.name
         if not any(each.measures[channel] for each in logged):
             continue
-        scatter = scatter_of_repeats(logged, named, channel)
+        scatter, rest = scatter_of_repeats(logged, named, channel), _rest(logged, channel)
+        if scatter and name in humming:
+            scatter = max(scatter, rest or 0.0)
         # What repeats itself is rounded alike each time; no simulation is.
         rounding = step_between(logged, channel) / np.sqrt(12.0)
         for source, level in (
             (REPEATS, scatter and max(scatter, rounding)),
             (TOLERANCE, stated.tolerance.get(name)),
             (ERRORS, stated.standard_error.get(name)),
-            (REST, _rest(logged, channel)),
+            (REST, rest),
         ):
             if level:
                 floors[name] = AcceptanceFloor(float(level), source)

@@ -80,6 +80,21 @@ def test_the_scatter_of_repeats_holds_what_the_rig_does_not_repeat():
     assert levels["pressure"].level == pytest.approx(TRUE["pressure"], rel=0.1)
 
 
+def test_repeats_that_share_the_phase_of_mains_are_no_quieter_than_rest():
+    """The hum of two repeats cancels in their difference; that of other trials does not."""
+    plant, trials = Plant(STATION), []
+    for seed in (1, 2):
+        trial = plant.simulate(commanded(1)[0], seed=seed)
+        hum = 2.0 * TRUE["pressure"] * np.sin(2.0 * np.pi * 50.0 * trial.time)
+        read = {**trial.measurements, "pressure": trial.measurements["pressure"] + hum}
+        trials.append(replace(trial, measurements=read))
+    each = logs(trials), named(trials), Stated()
+    quiet = acceptance_floors(*each)["pressure"].level
+    assert quiet == pytest.approx(TRUE["pressure"], rel=0.15)
+    loud = acceptance_floors(*each, {"pressure"})["pressure"].level
+    assert loud == pytest.approx(np.sqrt(3.0) * TRUE["pressure"], rel=0.15)
+
+
 def test_a_file_that_was_copied_is_no_repeat():
     trial = measured(STATION, 1)[0]
     assert floors([trial, trial])["load"].source == "rest segments"
