@@ -28,7 +28,7 @@ class DriveDelay(NamedTuple):
 
     share: Annotated[float, _SHARE]
     delay: Annotated[
-        float, Quantity("ms", 0.1, 500, "assumption: 10, a few cycles of a controller", usual=10)
+        float, Quantity("ms", 0.001, 500, "assumption: 10, a few cycles of a controller", usual=10)
     ]
 
 
@@ -36,7 +36,7 @@ class RegulatorDelay(NamedTuple):
     """Parameters of `delayed_pressure`."""
 
     share: Annotated[float, _SHARE]
-    delay: Annotated[float, Quantity("ms", 0.1, 500, "proportional regulators: 10-30 ms", usual=20)]
+    delay: Annotated[float, Quantity("ms", 0.001, 500, "proportional regulators: 10-30 ms", usual=20)]
 
 
 def ladder(asked, memory, delay, elements=ELEMENTS):

@@ -14,7 +14,7 @@ class DriveLag(NamedTuple):
     ]
     time_constant: Annotated[
         float,
-        Quantity("ms", 0.1, 200, "assumption: 1-5 for a current loop, 20 if filtered", usual=10),
+        Quantity("ms", 0.001, 200, "assumption: 1-5 for a current loop, 20 if filtered", usual=10),
     ]
 
 

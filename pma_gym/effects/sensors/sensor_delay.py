@@ -25,7 +25,7 @@ OUTPUT = (3.0 / 13.0, -13.0 / 17.0, 10.0 / 13.0)
 
 _SHARE = Quantity("1", 0, 1, "1 for a delay of every reading", 0.0, usual=1)
 _DELAY = Quantity(
-    "ms", 0.1, 500, "assumption: two loggers that nothing synchronises are 5-20 apart", usual=10
+    "ms", 0.001, 500, "assumption: two loggers that nothing synchronises are 5-20 apart", usual=10
 )
 
 
