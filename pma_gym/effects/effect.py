@@ -61,6 +61,8 @@ class Effect:
         memory_start: the parameter (field name) that gives the state at the start; empty for 0.
         held: parameters (field names) that a diagnosis leaves at their usual values when it fits
             the effect: geometry, and parameters that only switch the law on.
+        scanned: those of them (field names) whose size no rig shares with another, such as the
+            distance before a contact slips: a diagnosis holds them at the best value of a ladder.
         ties: simpler special cases of the law, each a row of parameters (field names): where the
             first equals the second, the others have no effect. A diagnosis prefers the simpler law
             unless the data reject it.
@@ -85,6 +87,7 @@ class Effect:
     memories: int = 1
     memory_start: str = ""
     held: tuple[str, ...] = ()
+    scanned: tuple[str, ...] = ()
     ties: tuple[tuple[str, ...], ...] = ()
     replaces: str = ""
 

@@ -113,7 +113,7 @@ def _lacking(
         return None
     file_keys = {stem: file_key for file_key, stem in effect.names_in_files().items()}
     quantities = {
-        stem: quantity if sizes is None or stem in effect.held else sizes.scaled(quantity)
+        stem: quantity if sizes is None else _sized(effect, stem, quantity, sizes)
         for stem, quantity in effect.quantities.items()
     }
     shown = {
@@ -138,6 +138,13 @@ def _lacking(
         return None
     own = {f"{effect.name}.{file_keys['repeat']}": list(orders or ())} if counted else {}
     return _candidate(effect.name, effect, extended, file_keys, shown, own)
+
+
+def _sized(effect: Effect, stem: str, quantity: Quantity, sizes: Sizes) -> Quantity:
+    """A quantity with the usual value of these trials."""
+    if stem in effect.scanned:
+        return sizes.within_way(quantity)
+    return quantity if stem in effect.held else sizes.scaled(quantity)
 
 
 def _candidate(

@@ -49,6 +49,9 @@ DIMENSIONS: dict[str, tuple[int, int, int, int]] = {
 }
 """Powers of force, speed, way and pressure in a unit, for those that scale with them."""
 
+DEFLECTION = 1e-3
+"""Most of what a contact deflects before it slips, over the way of the trials: an assumption."""
+
 RIPPLE = 4.0
 """Periods of a force that is periodic in the position, over half of the trials' longest way."""
 
@@ -80,6 +83,16 @@ class Sizes:
         usual = quantity.from_si(share * size * (self.pressure**pressure if pressure else 1.0))
         least = max(quantity.lower, 0.0)
         return replace(quantity, usual=float(np.clip(usual, least, quantity.upper)))
+
+    def within_way(self, quantity: Quantity) -> Quantity:
+        """A length with its usual value, or with a small share of the trials' ways if that is less.
+
+        A contact that deflects as far as its trials go never slips.
+        """
+        usual = quantity.usual
+        assert usual is not None
+        most = quantity.from_si(DEFLECTION * self.way)
+        return replace(quantity, usual=float(np.clip(min(usual, most), quantity.lower, usual)))
 
 
 def sizes(model: Model, trials: Sequence[Trial]) -> Sizes | None:

@@ -1,6 +1,6 @@
 """Fit candidates beside the effects selected so far, with restarts from better parameters."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -46,6 +46,15 @@ COST = 3.0
 def cost(fit: Fitted) -> float:
     """Twice the negative log-likelihood, with what parameters cost."""
     return fit.chi_square + 2.0 * COST * len(fit.paths)
+
+
+def starting_values(candidate: CandidateEffect, *fits: Fitted) -> np.ndarray:
+    """Values of a candidate's parameters in the last of some fits that has it, else a probe."""
+    for fit in reversed(fits):
+        if candidate.effect in fit.model.parameters and candidate.name in fit.names:
+            table = fit.model.values_in_files(candidate.effect)
+            return np.array([table[path.partition(".")[2]] for path in candidate.paths], float)
+    return candidate.probes[0]
 
 
 def stripped(problem: FitProblem, before: Fitted) -> Model:
@@ -210,17 +219,30 @@ def restarted(
     before: Fitted,
     chosen: tuple[CandidateEffect, ...],
     scores: Sequence[ScreeningScore],
+    scored: Collection[str],
     fits: dict[str, Fitted],
     journal: Journal,
     progress: Callable[[str, int, int], None],
 ) -> dict[str, Fitted]:
-    """Better fits, the likeliest first, until one comes near the trials; none where one has."""
+    """Better fits, the likeliest first, until one comes near the trials; none where one has.
+
+    Args:
+        problem: the trials.
+        baseline: the model that candidates were tried beside, ready to be looked beside.
+        before: the same.
+        chosen: the effects in it.
+        scores: of the candidates.
+        scored: names of those that were fitted because of their scores.
+        fits: all fits so far, by name.
+        journal: keeps fits.
+        progress: called with a step's name, what is done and the total.
+    """
     known = {each.candidate.name: each for each in scores}
     better: dict[str, Fitted] = {}
     if not all(map(problem.far, fits.values())):
         return better
-    most = max((known[name].gain for name in fits), default=0.0)
-    likely = [name for name in fits if known[name].gain >= LIKELY * most]
+    most = max((known[name].gain for name in scored), default=0.0)
+    likely = [name for name in scored if known[name].gain >= LIKELY * most]
     for number, name in enumerate(sorted(likely, key=lambda each: cost(fits[each]))):
         progress(f"fitting effect {len(chosen) + 1} from more beginnings", number, len(likely))
         restart = fitted(problem, baseline, before, chosen, known[name], journal, caught=True)
@@ -246,12 +268,23 @@ def better(
 
 
 def refit(
-    problem: FitProblem, fit: Fitted, chosen: tuple[CandidateEffect, ...], journal: Journal
+    problem: FitProblem,
+    fit: Fitted,
+    chosen: tuple[CandidateEffect, ...],
+    journal: Journal,
+    held: str = "",
 ) -> Fitted:
-    """A fit, from where it is, beside the noise that the bench has now."""
-    return _once(
-        "again", problem, fit, chosen, journal, lambda: problem.fit(fit.model, chosen) or fit
-    )
+    """A fit, from where it is, beside the noise that the bench has now.
+
+    Args:
+        problem: the trials.
+        fit: where it begins; the result where no better one can be made.
+        chosen: the effects in it.
+        journal: keeps fits.
+        held: what its model holds beside the values of the fit, for the journal.
+    """
+    what = f"again {held}".strip()
+    return _once(what, problem, fit, chosen, journal, lambda: problem.fit(fit.model, chosen) or fit)
 
 
 def _once(

@@ -5,7 +5,8 @@ data sets. It opens too where the residual itself is no noise: where it is many 
 (`far_off`), where it is autocorrelated beyond the noise (`autocorrelation`), or where single pieces
 are too large for noise (`scan_statistic`) and an effect explains them. What passes is fitted
 together with the model's parameters; the likeliest is added; then the same again beside it. Each
-effect is then left out once, and stays out if the fit is as good without it. The noise is estimated
+effect is then left out once, and stays out if the fit is as good without it, or exchanged for
+another that explains more beside the rest. The noise is estimated
 again only when all effects are selected: before, an autoregression would take the next effect for
 noise.
 """
@@ -38,7 +39,9 @@ from pma_gym.discovery.selection.candidate_fits import (
     unfitted,
     without_idle,
 )
+from pma_gym.discovery.selection.exchanged_effects import exchanged
 from pma_gym.discovery.selection.rugged_fits import is_rugged, settled
+from pma_gym.discovery.selection.scanned_parameters import likeliest_scanned, with_scanned
 from pma_gym.discovery.selection.unscored_fits import unscored_fits
 
 ALARM = 0.005
@@ -59,6 +62,10 @@ noise, and follows the motion."""
 SECOND_SHARE, SURE_SHARE = 0.12, 0.02
 """Least share of the first effect's gain that another must bring: what a law of the catalogue
 misses of its real likeness is of that order; and the same where the residual is surely no noise."""
+
+MUCH, MOST_OF = 2.0, 0.8
+"""Noises left from which on another effect counts that carries this share of what is left beyond
+the noise: an approximate law leaves less, and no other law carries that."""
 
 BEGINNINGS = 3
 """How often the selection begins anew from a better refitted model."""
@@ -91,6 +98,7 @@ class Stage:
         scan: pieces of it that opened the gate by themselves.
         unfitted: candidates that could not be fitted: their range, simulated, promises more than
             any fit brings, and their own fits bring far less although a refit keeps the promise.
+        scanned: candidates that were fitted with held parameters at other values, by name.
     """
 
     problem: FitProblem
@@ -102,6 +110,7 @@ class Stage:
     missing: bool
     scan: ScanStatistic = NO_EXCESS
     unfitted: tuple[str, ...] = ()
+    scanned: Mapping[str, CandidateEffect] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -149,14 +158,17 @@ def select(
     begun: list[str] = []
     best = refitted
     while len(chosen) < MOST_EFFECTS:
-        rest = [candidate for candidate in candidates if candidate not in chosen]
+        taken = {candidate.name for candidate in chosen}
+        rest = [candidate for candidate in candidates if candidate.name not in taken]
         stage = _stage(problem, best, chosen, rest, seed, journal, progress)
         stages.append(stage)
         added = _likeliest(stage, stages[0])
         if added is None:
             break
-        chosen = (*chosen, next(s for s in candidates if s.name == added))
+        new = next(each for each in candidates if each.name == added)
+        chosen = (*chosen, stage.scanned.get(added, new))
         best = better(problem, stage.fits[added], chosen, journal)
+        chosen, best = with_scanned(problem, best, chosen, journal)
         chosen, best = without_idle(problem, best, chosen, refitted, journal)
         if not chosen and best.chi_square < refitted.chi_square and len(begun) < BEGINNINGS:
             # The fit without effects was in a local minimum; restart from the better parameters.
@@ -165,6 +177,7 @@ def select(
         elif len(chosen) < len(stages):
             # One is not missed beside the other, and that is the end of it.
             break
+    chosen, best = exchanged(problem, best, chosen, [each.fits for each in stages], candidates)
     problem = replace(problem, noise=reestimated_noise(problem, best, chosen))
     fit = refit(problem, best, chosen, journal)
     if is_rugged(fit, chosen):
@@ -212,6 +225,7 @@ def _stage(
         gate = tuple(each for each in scores if each.starts)
     fits: dict[str, Fitted] = {}
     failed: tuple[str, ...] = ()
+    moved: dict[str, CandidateEffect] = {}
     if gate:
         worth = [each for each in scores if each.gain > NEAR * scores[0].gain and each.starts]
         for number, each in enumerate(worth[:TRIED]):
@@ -226,11 +240,17 @@ def _stage(
                 problem, baseline, before, chosen, others, fits, journal, progress
             )
         if not astray:
-            fits |= restarted(problem, baseline, before, chosen, worth, scored, journal, progress)
+            scanned = likeliest_scanned(problem, chosen, worth, fits, journal)
+            fits |= {name: fit for name, (_, fit) in scanned.items()}
+            restarts = restarted(
+                problem, baseline, before, chosen, worth, scored, fits, journal, progress
+            )
+            fits |= restarts
+            moved = {name: each for name, (each, _) in scanned.items() if name not in restarts}
         failed = unfitted(problem, baseline, before, chosen, worth[:TRIED], fits)
     if scan.excess and all(before.chi_square - fit.chi_square < least for fit in fits.values()):
         gate, fits, scores, scan = (), {}, plainly, NO_EXCESS
-    return Stage(shared, before, baseline, tuple(scores), fits, gate, missing, scan, failed)
+    return Stage(shared, before, baseline, tuple(scores), fits, gate, missing, scan, failed, moved)
 
 
 def _as_assumed(
@@ -285,6 +305,12 @@ def _least_change(problem: FitProblem) -> float:
     return PIECES_CHANGE if in_pieces else LEAST_CHANGE
 
 
+def _carries_the_rest(stage: Stage, gain: float) -> bool:
+    """Whether chi-square falls by most of what much more than noise is left."""
+    left = stage.before.chi_square - stage.problem.count
+    return stage.problem.left(stage.before) > MUCH and gain > MOST_OF * left
+
+
 def _likeliest(stage: Stage, first: Stage) -> str | None:
     """The candidate to add, or None."""
     if not stage.gate or not stage.fits:
@@ -303,7 +329,7 @@ def _likeliest(stage: Stage, first: Stage) -> str | None:
     gain = stage.before.chi_square - stage.fits[name].chi_square
     if gain < 30.0:
         return None
-    if stage is not first:
+    if stage is not first and not _carries_the_rest(stage, gain):
         least = min(first.fits.values(), key=cost)
         share = SURE_SHARE if stage.missing else SECOND_SHARE
         if gain < share * (first.before.chi_square - least.chi_square):

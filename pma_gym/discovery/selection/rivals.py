@@ -3,11 +3,9 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
 from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
 from pma_gym.discovery.fitting.fit_problem import FitProblem, Fitted
-from pma_gym.discovery.selection.candidate_fits import cost
+from pma_gym.discovery.selection.candidate_fits import cost, starting_values
 from pma_gym.discovery.selection.forward_selection import Stage
 
 NEAREST = 12.0
@@ -73,7 +71,7 @@ def rivals(
         candidate = next(each for each in candidates if each.name == name)
         others = [*chosen]
         others[place] = candidate
-        starts = {each.name: _start(each, best, stage.fits[name]) for each in others}
+        starts = {each.name: starting_values(each, best, stage.fits[name]) for each in others}
         begun = problem.given.replace(
             {path: stage.fits[name].estimate(path)[0] for path in problem.own.free}
         )
@@ -83,12 +81,3 @@ def rivals(
         behind = cost(fit) - cost(best)
         ranked.append(Rival(candidate, fit, behind, behind < max(NEAREST, NEAREST_SHARE * gain)))
     return sorted(ranked, key=lambda rival: rival.behind)
-
-
-def _start(candidate: CandidateEffect, *fits: Fitted) -> np.ndarray:
-    """Values of a candidate's parameters in the last of some fits that has it."""
-    for fit in reversed(fits):
-        if candidate.effect in fit.model.parameters and candidate.name in fit.names:
-            table = fit.model.values_in_files(candidate.effect)
-            return np.array([table[path.partition(".")[2]] for path in candidate.paths], float)
-    return candidate.probes[0]

@@ -49,6 +49,9 @@ ALIKE = 4.0
 """How many times the least chi-square one may have that explains about as well, a residual twice as
 large: where one trial outweighs all others, chance alone would allow anything."""
 
+AT_NOISE = 1.1
+"""Noises that a fit leaves which other optima could not better."""
+
 SURE = 1.96
 """Standard errors of a 95 % interval."""
 
@@ -96,13 +99,17 @@ def _interval(problem: FitProblem, fit: Fitted, chosen: Chosen) -> tuple[Array, 
 def settled(problem: FitProblem, fit: Fitted, chosen: Chosen) -> Fitted:
     """A fit near an optimum, refined; or the best of more optima where that does not converge.
 
+    A fit that leaves little more than the noise is not begun anew: no other optimum leaves less.
+
     Args:
         problem: the trials, with the noise that the fit leaves.
         fit: the fit; its spread is kept.
         chosen: the effects in it.
     """
     refit = refined(problem, fit, chosen)
-    return refit if refit.converged else best_of_optima(problem, refit, chosen)
+    if refit.converged or problem.left(refit) < AT_NOISE:
+        return refit
+    return best_of_optima(problem, refit, chosen)
 
 
 def _fits_from_simpler_laws(problem: FitProblem, fit: Fitted, chosen: Chosen) -> Iterator[Fitted]:

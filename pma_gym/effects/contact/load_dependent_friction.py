@@ -18,7 +18,7 @@ class LoadDependentFriction(NamedTuple):
     drive_share: Annotated[float, _SHARE]
     carried_share: Annotated[float, _SHARE]
     presliding: Annotated[
-        float, Quantity("um", 0.1, 20000, "assumption: 10 um at full force", usual=10)
+        float, Quantity("um", 0.0001, 20000, "assumption: 10 um at full force", usual=10)
     ]
 
 
@@ -80,6 +80,7 @@ LOAD_DEPENDENT_FRICTION = Effect(
     path_breakpoint=load_friction_bend,
     release_path=release_path,
     held=("presliding",),
+    scanned=("presliding",),
     signature=_SIGNATURE,
 )
 JOINT_LOAD_FRICTION = Effect(
@@ -91,5 +92,6 @@ JOINT_LOAD_FRICTION = Effect(
     path_breakpoint=load_friction_bend,
     release_path=release_path,
     held=("presliding",),
+    scanned=("presliding",),
     signature=_SIGNATURE,
 )

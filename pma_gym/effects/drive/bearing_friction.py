@@ -77,4 +77,5 @@ BEARING_FRICTION = Effect(
     ),
     memory_scale=10.0,
     held=("presliding",),
+    scanned=("presliding",),
 )

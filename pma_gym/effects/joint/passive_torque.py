@@ -93,6 +93,7 @@ JOINT_FRICTION = Effect(
     port="joint_torque",
     parameters=JointFriction,
     held=("presliding",),
+    scanned=("presliding",),
     ties=(("static", "dynamic", "stribeck_speed"),),
     law=friction_force,
     rate_independent_law=friction_path,

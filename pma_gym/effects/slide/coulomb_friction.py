@@ -24,7 +24,7 @@ class CoulombFriction(NamedTuple):
         float, Quantity("mm/s", 0.01, 1000, "assumption: 5 mm/s, ball slides 1-10", usual=5)
     ]
     presliding: Annotated[
-        float, Quantity("um", 0.1, 1000, "assumption: 10 um at full static force", usual=10)
+        float, Quantity("um", 0.0001, 1000, "assumption: 10 um at full static force", usual=10)
     ]
 
 
@@ -134,6 +134,7 @@ COULOMB_FRICTION = Effect(
     port="slide_force",
     parameters=CoulombFriction,
     held=("presliding",),
+    scanned=("presliding",),
     ties=(("static", "dynamic", "stribeck_speed"),),
     law=friction_force,
     rate_independent_law=friction_path,

@@ -1,0 +1,114 @@
+"""Held parameters that differ from rig to rig by powers of ten: the best of a ladder is held.
+
+How far a contact deflects before it slips decides how a joint starts to move, and chi-square is too
+rugged in it for a fit. A rolling guide deflects by a micrometre, a seal by a tenth of a millimetre.
+So the effects that have such a parameter are fitted again at a tenth and at ten times its value,
+and on in the direction in which the trials ask for it.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+from pma_gym.discovery.fitting.candidate_effect import CandidateEffect, bounds
+from pma_gym.discovery.fitting.fit_problem import FitProblem, Fitted
+from pma_gym.discovery.fitting.free_parameters import values
+from pma_gym.discovery.fitting.journal import Journal
+from pma_gym.discovery.screening.score_test import ScreeningScore
+from pma_gym.discovery.selection.candidate_fits import COST, cost, refit
+from pma_gym.effects import CATALOGUE
+
+LADDER = (10.0, 10.0**0.5)
+"""Steps of the ladder: decades first, then half of one beside the best."""
+
+ROUNDED = 1.0 + 1e-9
+"""How much within its bounds a value stays."""
+
+FAR_NEARER = 4.0
+"""How many times less chi-square must be far from the trials: a residual half as large."""
+
+Chosen = tuple[CandidateEffect, ...]
+
+
+def with_scanned(
+    problem: FitProblem, fit: Fitted, chosen: Chosen, journal: Journal, last: bool = False
+) -> tuple[Chosen, Fitted]:
+    """The effects and their fit, with scanned parameters at the best of their ladders.
+
+    Args:
+        problem: the trials.
+        fit: the fit of the effects.
+        chosen: the effects in it.
+        journal: keeps fits.
+        last: whether only those of the last effect are scanned.
+    """
+    for name in [candidate.name for candidate in chosen[-1 if last else 0 :]]:
+        candidate = next(each for each in chosen if each.name == name)
+        for path in _scanned(candidate):
+            for step in LADDER:
+                for factor in (1.0 / step, step):
+                    chosen, fit = _climbed(problem, fit, chosen, name, path, factor, journal)
+    return chosen, fit
+
+
+def likeliest_scanned(
+    problem: FitProblem,
+    chosen: Chosen,
+    scores: Sequence[ScreeningScore],
+    fits: Mapping[str, Fitted],
+    journal: Journal,
+) -> dict[str, tuple[CandidateEffect, Fitted]]:
+    """The likeliest candidate at the best of its ladders, where no fit comes near the trials.
+
+    It counts where the ladders bring it far nearer: what less brings may be another minimum.
+
+    Args:
+        problem: the trials.
+        chosen: the effects that candidates were fitted beside.
+        scores: of the candidates.
+        fits: of candidates, by name.
+        journal: keeps fits.
+    """
+    known = {each.candidate.name: each.candidate for each in scores}
+    name = min(fits, key=lambda each: cost(fits[each]), default=None)
+    if name not in known or not _scanned(known[name]) or not all(map(problem.far, fits.values())):
+        return {}
+    beside, fit = with_scanned(problem, fits[name], (*chosen, known[name]), journal, last=True)
+    return {name: (beside[-1], fit)} if FAR_NEARER * fit.chi_square < fits[name].chi_square else {}
+
+
+def _scanned(candidate: CandidateEffect) -> list[str]:
+    """Paths of the held parameters that are scanned."""
+    effect = CATALOGUE[candidate.effect]
+    stems = effect.names_in_files()
+    return [f"{effect.name}.{key}" for key, stem in stems.items() if stem in effect.scanned]
+
+
+def _climbed(
+    problem: FitProblem,
+    fit: Fitted,
+    chosen: Chosen,
+    name: str,
+    path: str,
+    factor: float,
+    journal: Journal,
+) -> tuple[Chosen, Fitted]:
+    """On along a ladder in one direction, as long as each step is worth a parameter."""
+    while True:
+        here = float(values(fit.model, [path])[0])
+        (lower,), (upper,) = bounds([path])
+        there = factor * here
+        # A bound that is converted to SI and back may lie beyond itself.
+        if not lower * ROUNDED < there < upper / ROUNDED:
+            return chosen, fit
+        moved = tuple(_at(each, path, there) if each.name == name else each for each in chosen)
+        begun = replace(fit, model=fit.model.replace({path: there}))
+        new = refit(problem, begun, moved, journal, f"{path} {there}")
+        worth = 2.0 * COST * max(1.0, problem.left(fit) ** 2)
+        if fit.chi_square - new.chi_square < worth:
+            return chosen, fit
+        chosen, fit = moved, new
+
+
+def _at(candidate: CandidateEffect, path: str, value: float) -> CandidateEffect:
+    """A candidate with a held parameter at another value (file unit)."""
+    return replace(candidate, model=candidate.model.replace({path: value}))
