@@ -101,6 +101,16 @@ def test_whitening_is_linear_and_missing_readings_leave_no_trace():
     assert np.array_equal(noise.white(one[None], missing), noise.white(touched[None], missing))
 
 
+def test_a_reading_without_a_whole_past_counts_by_the_level():
+    """Where every other reading is missing the rest still tell how large a residual is."""
+    noise = Whitening((0.5, 0.2), 0.8, 1.0)
+    series = np.random.default_rng(2).standard_normal((1, 2000))
+    missing = np.arange(1, 2000, 2)
+    white = noise.white(series, missing)
+    assert np.array_equal(white[0, ::2], series[0, ::2])
+    assert not white[0, missing].any()
+
+
 def test_rest_is_where_commands_have_long_been_constant():
     motor = np.ones(10 * 64)
     motor[128:256] = 2.0 + np.arange(128) / 128

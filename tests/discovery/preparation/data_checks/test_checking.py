@@ -170,6 +170,18 @@ def test_long_logs_are_averaged(tmp_path, monkeypatch):
     assert abs(block.mean() - parabola) > 1e-4
 
 
+def test_trials_of_one_rate_are_averaged_all_or_none(tmp_path, monkeypatch):
+    """They share one noise, and averages have less: one that cannot be averaged keeps all whole."""
+    monkeypatch.setattr("pma_gym.discovery.preparation.data_checks.averaging.MOST_ROWS", 2000)
+    monkeypatch.setattr("pma_gym.discovery.preparation.data_checks.averaging.AIM_ROWS", 1000)
+    plain, restless = (log(2.0, 300.0, seed, rate=500.0, seconds=4.0) for seed in (1, 2))
+    noise = np.random.default_rng(3).standard_normal(len(restless["time_s"]))
+    restless["motor_voltage_v"] = restless["motor_voltage_v"] + 0.1 * np.abs(noise)
+    data = checked(write(tmp_path / "lab", [plain, restless]))
+    assert [len(each.trial) for each in data.trials] == [2000, 2000]
+    assert not any("averaged" in words for words in data.checked)
+
+
 def test_a_slide_begins_where_it_likes(tmp_path):
     """Its pieces have starts of their own; it is only cut."""
     model = load_model(read_dataset("tests/discovery/rigs/driven_slide").model)
