@@ -36,7 +36,9 @@ class RegulatorDelay(NamedTuple):
     """Parameters of `delayed_pressure`."""
 
     share: Annotated[float, _SHARE]
-    delay: Annotated[float, Quantity("ms", 0.001, 500, "proportional regulators: 10-30 ms", usual=20)]
+    delay: Annotated[
+        float, Quantity("ms", 0.001, 500, "proportional regulators: 10-30 ms", usual=20)
+    ]
 
 
 def ladder(asked, memory, delay, elements=ELEMENTS):

@@ -223,34 +223,80 @@ def _stage(
         least = max(CARRIED * scan.excess, _least_change(problem) ** 2 * rows)
         scores = _refined_scores(problem, baseline, before, scores, scan.chance, least)
         gate = tuple(each for each in scores if each.starts)
-    fits: dict[str, Fitted] = {}
-    failed: tuple[str, ...] = ()
-    moved: dict[str, CandidateEffect] = {}
+    tried = _Tried()
     if gate:
-        worth = [each for each in scores if each.gain > NEAR * scores[0].gain and each.starts]
-        for number, each in enumerate(worth[:TRIED]):
-            progress(f"fitting effect {len(chosen) + 1}", number, len(worth[:TRIED]))
-            refit = fitted(problem, baseline, before, chosen, each, journal)
-            if refit is not None:
-                fits[each.candidate.name] = refit
-        scored, tried = dict(fits), {each.candidate.name for each in worth[:TRIED]}
-        if far:
-            others = [each for each in scores if each.candidate.name not in tried]
-            fits |= unscored_fits(
-                problem, baseline, before, chosen, others, fits, journal, progress
-            )
-        if not astray:
-            scanned = likeliest_scanned(problem, chosen, worth, fits, journal)
-            fits |= {name: fit for name, (_, fit) in scanned.items()}
-            restarts = restarted(
-                problem, baseline, before, chosen, worth, scored, fits, journal, progress
-            )
-            fits |= restarts
-            moved = {name: each for name, (each, _) in scanned.items() if name not in restarts}
-        failed = unfitted(problem, baseline, before, chosen, worth[:TRIED], fits)
-    if scan.excess and all(before.chi_square - fit.chi_square < least for fit in fits.values()):
-        gate, fits, scores, scan = (), {}, plainly, NO_EXCESS
-    return Stage(shared, before, baseline, tuple(scores), fits, gate, missing, scan, failed, moved)
+        beside = problem, baseline, before, chosen
+        tried = _tried(*beside, scores, far, not astray, journal, progress)
+    gains = [before.chi_square - fit.chi_square for fit in tried.fits.values()]
+    if scan.excess and all(gain < least for gain in gains):
+        gate, tried, scores, scan = (), replace(tried, fits={}), plainly, NO_EXCESS
+    return Stage(
+        shared,
+        before,
+        baseline,
+        tuple(scores),
+        tried.fits,
+        gate,
+        missing,
+        scan,
+        tried.unfitted,
+        tried.scanned,
+    )
+
+
+@dataclass(frozen=True)
+class _Tried:
+    """What fits of candidates led to: three attributes of `Stage`."""
+
+    fits: dict[str, Fitted] = field(default_factory=dict)
+    unfitted: tuple[str, ...] = ()
+    scanned: Mapping[str, CandidateEffect] = field(default_factory=dict)
+
+
+def _tried(
+    problem: FitProblem,
+    baseline: Baseline,
+    before: Fitted,
+    chosen: tuple[CandidateEffect, ...],
+    scores: Sequence[ScreeningScore],
+    far: bool,
+    restarts: bool,
+    journal: Journal,
+    progress: Progress,
+) -> _Tried:
+    """Fits of the candidates that may be worth one.
+
+    Args:
+        problem: the trials.
+        baseline: the model that they are tried beside, ready to be looked beside.
+        before: the same.
+        chosen: the effects in it.
+        scores: of all candidates, the best first.
+        far: whether what is left is many times the noise, so that scores tell little.
+        restarts: whether fits that come near no trial are begun again.
+        journal: keeps fits.
+        progress: called with a step's name, what is done and the total.
+    """
+    fits: dict[str, Fitted] = {}
+    worth = [each for each in scores if each.gain > NEAR * scores[0].gain and each.starts]
+    for number, each in enumerate(worth[:TRIED]):
+        progress(f"fitting effect {len(chosen) + 1}", number, len(worth[:TRIED]))
+        refit = fitted(problem, baseline, before, chosen, each, journal)
+        if refit is not None:
+            fits[each.candidate.name] = refit
+    beside, scored = (problem, baseline, before, chosen), dict(fits)
+    if far:
+        names = {each.candidate.name for each in worth[:TRIED]}
+        others = [each for each in scores if each.candidate.name not in names]
+        fits |= unscored_fits(*beside, others, fits, journal, progress)
+    moved: dict[str, CandidateEffect] = {}
+    if restarts:
+        scanned = likeliest_scanned(problem, chosen, worth, fits, journal)
+        fits |= {name: fit for name, (_, fit) in scanned.items()}
+        better_ones = restarted(*beside, worth, scored, fits, journal, progress)
+        fits |= better_ones
+        moved = {name: each for name, (each, _) in scanned.items() if name not in better_ones}
+    return _Tried(fits, unfitted(*beside, worth[:TRIED], fits), moved)
 
 
 def _as_assumed(
