@@ -52,7 +52,9 @@ def meet(states: Array, held: Array, logged: Logged, levels: Array, further: int
         along.append(change)
         off.append(weight * (logged.measured[channel, there] - held[:-further, channel, there]))
     moves = np.concatenate(along, axis=1)
-    sizes = moves @ moves.T
+    # A simulation that runs away has no finite sizes; it stays as it is.
+    with np.errstate(over="ignore", invalid="ignore"):
+        sizes = moves @ moves.T
     if not np.isfinite(sizes).all() or not sizes.any():
         return
     # What one start does as well as the other is shared between them.
