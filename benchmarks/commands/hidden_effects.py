@@ -36,7 +36,7 @@ def hidden_effects(
         str,
         typer.Option(
             help="single, faint, nothing, parameters, pair, unknown, slow_drift, undecidable, "
-            "rigs, or all; single_ and nothing_ with hum, drift, coloured or outliers."
+            "rigs, or all."
         ),
     ],
     n: Annotated[int, typer.Option("--n", min=1, help="Cases of a block; more extend the set.")],

@@ -1,6 +1,7 @@
 import ast
 import json
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -181,7 +182,7 @@ def test_an_effect_of_size_0_is_absent(commands):
 
 def test_a_leak_lowers_the_pressure_as_far_as_the_regulator_lets_it():
     """At rest (asked - p) / tau = k (p + 1 atm), once the leak is open; before, nothing leaks."""
-    rows = int(4.0 * RATE)
+    rows = int(2.5 * RATE)
     still = Commands(np.full((1, rows), 1.0), np.full((1, rows), 4.0), np.zeros(1))
     leak = {"leakage": {"rate_per_s": 0.2, "opening_s": 0.4}}
     tight, leaking = simulate_variants(still, [(NOMINAL, {}), (NOMINAL, leak)])
@@ -287,7 +288,8 @@ def test_trials_stay_within_what_the_rig_bears():
 
 
 def test_slow_effects_hide_under_a_drift():
-    truths = [DRAWN["slow_drift"].draw(11, number).truth for number in (1, 2, 3)]
+    block = replace(DRAWN["slow_drift"], **TINY)
+    truths = [block.draw(11, number).truth for number in (1, 2, 3)]
     assert [t["effects"][0]["name"] for t in truths] == ["creep", "leakage", "warm_up"]
     assert all(t["readout_noise"]["kind"] == "drift" and not t["weak"] for t in truths)
 
