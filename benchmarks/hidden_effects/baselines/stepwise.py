@@ -27,7 +27,8 @@ from pma_gym.discovery.screening.probe_scores import Baseline
 from pma_gym.discovery.screening.residuals import simulated_less_measured
 from pma_gym.discovery.screening.score_test import screen
 from pma_gym.discovery.screening.starting_points import starting_points
-from pma_gym.discovery.selection.forward_selection import MOST_EFFECTS, NEAR, TRIED
+from pma_gym.discovery.selection.forward_selection import MOST_EFFECTS
+from pma_gym.discovery.selection.tried_candidates import NEAR, TRIED
 
 Array = NDArray[np.float64]
 

@@ -89,8 +89,11 @@ _NOTHING_UGLY = (
 )
 
 _SLOW_DRIFT = (
-    Rate("said to agree", lambda o: o.verdict == "agrees", Target(most=0.02)),
-    Rate("said to be of right structure", lambda o: o.verdict in RIGHT_STRUCTURE),
+    # Parameters are off in every case: `agrees` alone would never be said.
+    Rate(
+        "said to be of right structure", lambda o: o.verdict in RIGHT_STRUCTURE, Target(most=0.02)
+    ),
+    Rate("said to agree", lambda o: o.verdict == "agrees"),
     Rate("right or in its group, or unknown", lambda o: o.near or o.verdict == "unknown"),
     Rate("a false name", lambda o: o.wrong),
 )

@@ -14,8 +14,8 @@ from pma_gym.discovery.screening.probe_scores import Baseline
 from pma_gym.discovery.screening.scanned_range import ScannedRange, scanned_range
 from pma_gym.discovery.screening.score_test import ScreeningScore
 from pma_gym.discovery.screening.starting_points import starting_points
+from pma_gym.discovery.selection.kept_fits import kept_form, restored
 from pma_gym.discovery.selection.rugged_fits import best_of_optima, is_rugged
-from pma_gym.document_shape import ANY, ListOf, Real, check_shape
 from pma_gym.effects import CATALOGUE
 from pma_gym.plant.model import Model
 
@@ -331,70 +331,3 @@ def without_idle(
         if missed < max(30.0, 0.02 * max(worst - best.chi_square, 0.0)):
             return others, refit(problem, without, others, journal)
     return chosen, best
-
-
-_KEPT = {
-    "paths": ListOf(str),
-    "values": ListOf(Real()),
-    "covariance": ListOf(ListOf(Real(finite=False))),
-    "chi_square": Real(),
-    "steps": ListOf(Real(finite=False)),
-    "converged": bool,
-    "reach": {ANY: Real(1.0)},
-    "spread": {ANY: ListOf(Real())},
-}
-"""Shape of a fit in a journal."""
-
-
-def kept_form(fit: Fitted) -> dict:
-    """A fit as a journal keeps it."""
-    return {
-        "paths": list(fit.paths),
-        "values": fit.values.tolist(),
-        "covariance": fit.covariance.tolist(),
-        "chi_square": fit.chi_square,
-        "steps": fit.steps.tolist(),
-        "converged": bool(fit.converged),
-        "reach": dict(fit.reach),
-        "spread": {path: list(ends) for path, ends in fit.spread.items()},
-    }
-
-
-def restored(
-    kept: dict, problem: FitProblem, before: Fitted, extra: Sequence[CandidateEffect]
-) -> Fitted:
-    """A fit from a journal.
-
-    Raises:
-        ValueError: an entry of another form, or of other parameters.
-    """
-    check_shape(kept, _KEPT)
-    count = len(kept["paths"])
-    wanted = [*problem.own.free, *(path for each in extra for path in each.fitted_paths)]
-    shapes = (len(kept["values"]), len(kept["steps"]), np.shape(kept["covariance"]))
-    if shapes != (count, count, (count, count)) or kept["paths"] != wanted:
-        raise ValueError(f"it has {shapes} numbers of {count} parameters")
-    model = before.model
-    for candidate in extra:
-        model = candidate.beside(model)
-        switched = {
-            path: float(value)
-            for path, value, free in zip(
-                candidate.paths, candidate.probes[0], candidate.fitted, strict=True
-            )
-            if not free
-        }
-        model = model.replace(switched) if switched else model
-    by_path = dict(zip(kept["paths"], kept["values"], strict=True))
-    return Fitted(
-        model.replace(by_path),
-        tuple(candidate.name for candidate in extra),
-        tuple(kept["paths"]),
-        np.array(kept["values"]),
-        np.array(kept["covariance"]),
-        kept["chi_square"],
-        np.array(kept["steps"]),
-        kept["converged"],
-        kept["reach"],
-        {path: (min(ends), max(ends)) for path, ends in kept["spread"].items()},
-    )

@@ -5,13 +5,12 @@ data sets. It opens too where the residual itself is no noise: where it is many 
 (`far_off`), where it is autocorrelated beyond the noise (`autocorrelation`), or where single pieces
 are too large for noise (`scan_statistic`) and an effect explains them. What passes is fitted
 together with the model's parameters; the likeliest is added; then the same again beside it. Each
-effect is then left out once, and stays out if the fit is as good without it, or exchanged for
-another that explains more beside the rest. The noise is estimated
-again only when all effects are selected: before, an autoregression would take the next effect for
-noise.
+effect is then left out once, and stays out if the fit is as good without it, or is exchanged for
+another that explains more beside the rest. The noise is estimated again only when all effects are
+selected: before, an autoregression would take the next effect for noise.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
@@ -32,17 +31,14 @@ from pma_gym.discovery.screening.starting_points import refined_score
 from pma_gym.discovery.selection.candidate_fits import (
     better,
     cost,
-    fitted,
     probed,
     refit,
-    restarted,
-    unfitted,
     without_idle,
 )
 from pma_gym.discovery.selection.exchanged_effects import exchanged
 from pma_gym.discovery.selection.rugged_fits import is_rugged, settled
-from pma_gym.discovery.selection.scanned_parameters import likeliest_scanned, with_scanned
-from pma_gym.discovery.selection.unscored_fits import unscored_fits
+from pma_gym.discovery.selection.scanned_parameters import with_scanned
+from pma_gym.discovery.selection.tried_candidates import Progress, Tried, fits_of_candidates
 
 ALARM = 0.005
 """Family-wise rate of false alarms that the gate lets through."""
@@ -73,14 +69,9 @@ BEGINNINGS = 3
 MOST_EFFECTS = 3
 """Most effects that are added."""
 
-TRIED, NEAR = 8, 0.05
-"""How many candidates are fitted at most, and the share of the best look's gain that one needs."""
-
 CARRIED = 0.5
 """Share of the bursts in a residual that a fit must explain, where they alone opened the gate:
 noise that is larger in places bursts too, and no effect explains half of that."""
-
-Progress = Callable[[str, int, int], None]
 
 
 @dataclass(frozen=True)
@@ -223,10 +214,10 @@ def _stage(
         least = max(CARRIED * scan.excess, _least_change(problem) ** 2 * rows)
         scores = _refined_scores(problem, baseline, before, scores, scan.chance, least)
         gate = tuple(each for each in scores if each.starts)
-    tried = _Tried()
+    tried = Tried()
     if gate:
         beside = problem, baseline, before, chosen
-        tried = _tried(*beside, scores, far, not astray, journal, progress)
+        tried = fits_of_candidates(*beside, scores, far, not astray, journal, progress)
     gains = [before.chi_square - fit.chi_square for fit in tried.fits.values()]
     if scan.excess and all(gain < least for gain in gains):
         gate, tried, scores, scan = (), replace(tried, fits={}), plainly, NO_EXCESS
@@ -242,61 +233,6 @@ def _stage(
         tried.unfitted,
         tried.scanned,
     )
-
-
-@dataclass(frozen=True)
-class _Tried:
-    """What fits of candidates led to: three attributes of `Stage`."""
-
-    fits: dict[str, Fitted] = field(default_factory=dict)
-    unfitted: tuple[str, ...] = ()
-    scanned: Mapping[str, CandidateEffect] = field(default_factory=dict)
-
-
-def _tried(
-    problem: FitProblem,
-    baseline: Baseline,
-    before: Fitted,
-    chosen: tuple[CandidateEffect, ...],
-    scores: Sequence[ScreeningScore],
-    far: bool,
-    restarts: bool,
-    journal: Journal,
-    progress: Progress,
-) -> _Tried:
-    """Fits of the candidates that may be worth one.
-
-    Args:
-        problem: the trials.
-        baseline: the model that they are tried beside, ready to be looked beside.
-        before: the same.
-        chosen: the effects in it.
-        scores: of all candidates, the best first.
-        far: whether what is left is many times the noise, so that scores tell little.
-        restarts: whether fits that come near no trial are begun again.
-        journal: keeps fits.
-        progress: called with a step's name, what is done and the total.
-    """
-    fits: dict[str, Fitted] = {}
-    worth = [each for each in scores if each.gain > NEAR * scores[0].gain and each.starts]
-    for number, each in enumerate(worth[:TRIED]):
-        progress(f"fitting effect {len(chosen) + 1}", number, len(worth[:TRIED]))
-        refit = fitted(problem, baseline, before, chosen, each, journal)
-        if refit is not None:
-            fits[each.candidate.name] = refit
-    beside, scored = (problem, baseline, before, chosen), dict(fits)
-    if far:
-        names = {each.candidate.name for each in worth[:TRIED]}
-        others = [each for each in scores if each.candidate.name not in names]
-        fits |= unscored_fits(*beside, others, fits, journal, progress)
-    moved: dict[str, CandidateEffect] = {}
-    if restarts:
-        scanned = likeliest_scanned(problem, chosen, worth, fits, journal)
-        fits |= {name: fit for name, (_, fit) in scanned.items()}
-        better_ones = restarted(*beside, worth, scored, fits, journal, progress)
-        fits |= better_ones
-        moved = {name: each for name, (each, _) in scanned.items() if name not in better_ones}
-    return _Tried(fits, unfitted(*beside, worth[:TRIED], fits), moved)
 
 
 def _as_assumed(

@@ -50,7 +50,7 @@ ALIKE = 4.0
 large: where one trial outweighs all others, chance alone would allow anything."""
 
 AT_NOISE = 1.1
-"""Noises that a fit leaves which other optima could not better."""
+"""Noises up to which a fit counts as at the noise: an assumption."""
 
 SURE = 1.96
 """Standard errors of a 95 % interval."""
@@ -99,7 +99,7 @@ def _interval(problem: FitProblem, fit: Fitted, chosen: Chosen) -> tuple[Array, 
 def settled(problem: FitProblem, fit: Fitted, chosen: Chosen) -> Fitted:
     """A fit near an optimum, refined; or the best of more optima where that does not converge.
 
-    A fit that leaves little more than the noise is not begun anew: no other optimum leaves less.
+    A fit that leaves little more than the noise is not begun anew: others hardly leave less.
 
     Args:
         problem: the trials, with the noise that the fit leaves.

@@ -14,8 +14,9 @@ from pma_gym.discovery.screening.candidates import candidate_effects
 from pma_gym.discovery.screening.residuals import is_autocorrelated, scan_of_fit
 from pma_gym.discovery.screening.score_test import ScreeningScore
 from pma_gym.discovery.selection import forward_selection
-from pma_gym.discovery.selection.candidate_fits import cost, kept_form, restored
+from pma_gym.discovery.selection.candidate_fits import cost
 from pma_gym.discovery.selection.forward_selection import ALARM, passes, select
+from pma_gym.discovery.selection.kept_fits import kept_form, restored
 from pma_gym.plant.plant import Plant
 from tests.discovery.laboratory import HYSTERESIS, OFF, STATION, commanded, fit_problem, laboratory
 
