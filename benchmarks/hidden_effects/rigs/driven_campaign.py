@@ -18,8 +18,8 @@ from benchmarks.hidden_effects.rigs.simulators import mujoco_axis, stick_slip
 from benchmarks.hidden_effects.rigs.simulators.drive import Transmission
 from benchmarks.hidden_effects.rigs.simulators.stick_slip import Motion
 
-SIMULATORS = {"own": stick_slip.simulate, "MuJoCo": mujoco_axis.simulate}
-"""What computes the motion."""
+UNTOLD = 0.1
+"""Share of a sensor's noise below which the error of a simulation must stay: nobody tells it."""
 
 PILOT = 12.0
 """Seconds of the first file by which an effect's size is counted, and two periods."""
@@ -60,7 +60,7 @@ class DrivenCampaign:
         references: of its files.
         repeats: by number of a file, from 0, the earlier one that it repeats.
         bandwidth: of its loop (Hz); 0 where it is open.
-        simulator: name of what computes it.
+        simulator: what computes it, "own" or "MuJoCo".
         seed: of the noise.
     """
 
@@ -86,8 +86,11 @@ class DrivenCampaign:
         for each in effects:
             transmission = each.transmission(transmission)
         start = (float(reference.q[0]), 0.0)
-        simulate = SIMULATORS[self.simulator]
-        motion = simulate(rig, tuple(effects), transmission, controller, rows, start)
+        moved = rig, tuple(effects), transmission, controller, rows, start
+        if self.simulator == "MuJoCo":
+            motion = mujoco_axis.simulate(*moved, self._mujoco_step())
+        else:
+            motion = stick_slip.simulate(*moved)
         controller.end(float(motion.q[-1]))
         return Run(motion, np.array(sensed.exact), np.array(controller.readings))
 
@@ -151,6 +154,11 @@ class DrivenCampaign:
         """Whether it rests while its drive is off: where nothing else moves it."""
         pulled = any(each.force(0.0, 0.0, 0.0) for each in effects)
         return not pulled and not self.rig.gravity * math.sin(self.rig.gravity_angle)
+
+    def _mujoco_step(self) -> float:
+        """Longest step whose errors the sensor does not tell (s)."""
+        acceleration = self.rig.peak_force / self.rig.inertia
+        return mujoco_axis.step_within(UNTOLD * self.sensor.rms, acceleration)
 
     def _noise(self, i: int) -> np.ndarray:
         rng = np.random.default_rng((*self.seed, i, 7))

@@ -17,8 +17,8 @@ from benchmarks.hidden_effects.rigs.rig import GRAVITY, Rig
 from benchmarks.hidden_effects.rigs.simulators.drive import Drive, Transmission
 from benchmarks.hidden_effects.rigs.simulators.stick_slip import Motion, Source
 
-LONGEST = 0.25e-3
-"""Longest step (s)."""
+LONGEST, SHORTEST = 0.25e-3, 0.01e-3
+"""Longest and shortest step (s)."""
 
 RADIUS = 0.1
 """Of gyration of a slide's body (m); only its drag depends on it."""
@@ -86,6 +86,19 @@ def simulate(
                     table[row - 1, 1:3] = world.begun()
         table[row] = *world.state(), command
     return Motion(np.arange(rows) * interval, *table.T)
+
+
+def step_within(error: float, acceleration: float) -> float:
+    """Step whose error of position is at most so large (m, rad); returns s.
+
+    The force of a step is that at its start: that moves a leapfrog's positions by about a sixth of
+    acceleration times step squared, and a spring's period adds to it.
+
+    Args:
+        error: at most.
+        acceleration: largest of the axis (m/s^2, rad/s^2).
+    """
+    return min(max(math.sqrt(3.0 * error / acceleration), SHORTEST), LONGEST)
 
 
 class World:

@@ -167,3 +167,19 @@ def test_without_mujoco_the_message_names_the_extra(monkeypatch):
     monkeypatch.setitem(__import__("sys").modules, "mujoco", None)
     with pytest.raises(mujoco_axis.NoMujoco, match=r"pma-gym\[foreign\]"):
         mujoco_axis.mujoco()
+
+
+def test_mujoco_errs_by_no_more_than_its_step_is_chosen_for():
+    pytest.importorskip("mujoco")
+    rng = np.random.default_rng(7)
+    forces = np.cumsum(rng.normal(0.0, 1.0, 1000))
+    sprung = rig(SLIDE, stiffness=2000.0, damping=20.0, rate=500.0)
+    exact = moved(stick_slip.simulate, sprung, (), lambda row, q: forces[row], rows=1000)
+    acceleration, errors = float(np.abs(exact.a).max()), (1e-7, 1e-8, 1e-9)
+    for error in errors:
+        step = mujoco_axis.step_within(error, acceleration)
+        swung = mujoco_axis.simulate(
+            sprung, (), Transmission(), lambda row, q: forces[row], 1000, (0.0, 0.0), step
+        )
+        assert np.abs(swung.q - exact.q).max() < error
+    assert mujoco_axis.step_within(1.0, 1.0) == mujoco_axis.LONGEST
