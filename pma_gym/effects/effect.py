@@ -64,8 +64,8 @@ class Effect:
         scanned: those of them (field names) whose size no rig shares with another, such as the
             distance before a contact slips: a diagnosis holds them at the best value of a ladder.
         ties: simpler special cases of the law, each a row of parameters (field names): where the
-            first equals the second, the others have no effect. A diagnosis prefers the simpler law
-            unless the data reject it.
+            first equals the second, the others have no effect. The first is never the smaller one.
+            A diagnosis prefers the simpler law unless the data reject it.
         replaces: the part of a model that the effect is one of several forms of: a force law, a
             damping, a person, or a law of free shape. Such an effect replaces another one and is
             not added to it, so a diagnosis never proposes it as missing; compare whole models

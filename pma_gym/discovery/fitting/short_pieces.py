@@ -21,16 +21,22 @@ SHORT_S, LEAST_ROWS = 0.25, 12
 """About how long pieces are (s), and how many readings they have at least about."""
 
 MOST_PIECES = 100
-"""How many pieces are taken at most, evenly over the trials."""
+"""How many pieces are taken at most."""
 
 Array = NDArray[np.float64]
 
 
-def in_short_pieces(problem: FitProblem) -> FitProblem:
-    """The same problem with short pieces of its trials; as it is where none can be cut.
+def in_short_pieces(problem: FitProblem, most: int = MOST_PIECES) -> FitProblem:
+    """The same problem with short pieces of its trials; as it is where none can be cut, or are.
 
     Mains lines and drifts are left out of the noise: a piece is too short to tell of them.
+
+    Args:
+        problem: the trials.
+        most: how many pieces are taken at most, evenly over the trials.
     """
+    if problem.wholes:
+        return problem
     cut = [
         (whole, piece)
         for whole, trial in enumerate(problem.trials)
@@ -39,7 +45,7 @@ def in_short_pieces(problem: FitProblem) -> FitProblem:
     ]
     if not cut:
         return problem
-    places = np.linspace(0, len(cut) - 1, min(MOST_PIECES, len(cut))).round().astype(int)
+    places = np.linspace(0, len(cut) - 1, min(most, len(cut))).round().astype(int)
     taken = [cut[place] for place in np.unique(places)]
     return replace(
         problem,

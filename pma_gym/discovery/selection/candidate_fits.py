@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
+from pma_gym.discovery.fitting.fewer_pieces import with_fewer_pieces
 from pma_gym.discovery.fitting.fit_problem import FitProblem, Fitted
 from pma_gym.discovery.fitting.free_parameters import values
 from pma_gym.discovery.fitting.journal import Journal
@@ -38,6 +39,10 @@ LIKELY = 0.25
 
 LEAST_FITTED = 0.35
 """The same, below which a candidate counts as one that could not be fitted."""
+
+MOST_LEFT = 0.1
+"""Share of chi-square that an effect leaves at most where it carries most of a misfit: a third of
+the residual."""
 
 COST = 3.0
 """Log-likelihood that a parameter costs: half the logarithm of some 400 effective readings."""
@@ -91,21 +96,24 @@ def fitted(
         return kept
     best: Fitted | None = None
     whitened = probed(problem, before, each.candidate)
+    searched = with_fewer_pieces(problem) if caught else problem
     for model, begun in _beginnings(problem, baseline, whitened, before, each, caught):
-        fit = problem.fit(model, extra, {each.candidate.name: begun})
+        fit = searched.fit(model, extra, {each.candidate.name: begun})
         if fit is not None and caught:
-            fit = problem.continuation(fit, extra)
+            fit = searched.continuation(fit, extra)
         alike = _alike(best, fit)
         if fit is not None and (best is None or fit.chi_square < best.chi_square):
             best = fit
         # As much as the look promised, or near at last: no other beginning is needed. Nor is one
         # where the last two ended alike.
         if best is not None and (
-            alike or not problem.far(best)
+            alike or not searched.far(best)
             if caught
             else before.chi_square - best.chi_square >= each.gain
         ):
             break
+    if best is not None and searched is not problem:
+        best = problem.fit(best.model, extra)
     kept = 0.0 if best is None else before.chi_square - best.chi_square
     # Far from the trials a promise of less than two like fits differ by is not worth a scan.
     slight = problem.far(before) and each.gain < ALIKE * before.chi_square
@@ -254,15 +262,32 @@ def restarted(
 
 
 def better(
-    problem: FitProblem, fit: Fitted, chosen: tuple[CandidateEffect, ...], journal: Journal
+    problem: FitProblem,
+    fit: Fitted,
+    chosen: tuple[CandidateEffect, ...],
+    before: Fitted,
+    journal: Journal,
 ) -> Fitted:
-    """A fit, or a better one from a careful search: what it misses would look like an effect."""
+    """A fit, or a better one from a careful search: what it misses would look like an effect.
+
+    Args:
+        problem: the trials.
+        fit: the fit.
+        chosen: the effects in it.
+        before: without the last effect.
+        journal: keeps fits.
+    """
 
     def search() -> Fitted:
         refit = problem.careful_fit(fit.model.replace(_given(problem)), chosen)
         best = fit if refit is None or refit.chi_square >= fit.chi_square else refit
         best = problem.continuation(best, chosen)
-        return best_of_optima(problem, best, chosen) if is_rugged(best, chosen) else best
+        if not is_rugged(best, chosen):
+            return best
+        # Where most of the misfit is left another effect is looked for first; what short pieces
+        # find is fitted to the trials anyway.
+        carries = best.chi_square < MOST_LEFT * before.chi_square
+        return best_of_optima(problem, best, chosen, refines=carries and not problem.wholes)
 
     return _once("better", problem, fit, chosen, journal, search)
 

@@ -5,7 +5,7 @@ explain more: a spring stands for a hardening spring as long as damping that dep
 missing.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
 from pma_gym.discovery.fitting.fit_problem import FitProblem, Fitted
@@ -14,18 +14,25 @@ from pma_gym.discovery.selection.candidate_fits import cost, starting_values, st
 TRIED = 4
 """How many effects are tried in the place of one: those that explained most there."""
 
+LEAST_GAIN = 0.5
+"""Share of an effect's gain that another must bring in its place there to be tried."""
+
 LEAST = 30.0
 """Chi-square, in squared noises left, by which another must explain more."""
 
 Chosen = tuple[CandidateEffect, ...]
+
+Round = tuple[Fitted, Mapping[str, Fitted]]
+"""A round of the selection: what candidates were fitted beside, and their fits by name."""
 
 
 def exchanged(
     problem: FitProblem,
     fit: Fitted,
     chosen: Chosen,
-    rounds: Sequence[Mapping[str, Fitted]],
+    rounds: Sequence[Round],
     candidates: Sequence[CandidateEffect],
+    places: Iterable[int],
 ) -> tuple[Chosen, Fitted]:
     """The effects and their fit, each in turn exchanged for one that explains more beside the rest.
 
@@ -33,16 +40,16 @@ def exchanged(
         problem: the trials.
         fit: the fit of the effects.
         chosen: the effects, in the order in which they were selected.
-        rounds: the fits of all candidates in each round of the selection, by name.
+        rounds: of the selection.
         candidates: the whole catalogue.
+        places: of the effects that may be exchanged.
     """
     known = {candidate.name: candidate for candidate in candidates}
-    # The last was the best beside all others already.
-    for place in range(len(chosen) - 1):
+    for place in places:
         taken = {each.name for each in chosen}
-        fits = next((each for each in rounds if chosen[place].name in each), {})
-        names = sorted(set(fits) - taken, key=lambda name: cost(fits[name]))[:TRIED]
-        for name in names:
+        fits, most = _near(chosen[place].name, rounds)
+        near = [name for name in set(fits) - taken if fits[name].chi_square < most]
+        for name in sorted(near, key=lambda name: cost(fits[name]))[:TRIED]:
             others = (*chosen[:place], known[name], *chosen[place + 1 :])
             starts = {each.name: starting_values(each, fits[name], fit) for each in others}
             new = problem.fit(stripped(problem, fit), others, starts)
@@ -50,3 +57,12 @@ def exchanged(
             if new is not None and cost(new) < cost(fit) - least:
                 chosen, fit = others, new
     return chosen, fit
+
+
+def _near(name: str, rounds: Sequence[Round]) -> tuple[Mapping[str, Fitted], float]:
+    """Fits of the round in which an effect was selected, and the most chi-square that is near."""
+    for before, fits in rounds:
+        if name in fits:
+            gain = before.chi_square - fits[name].chi_square
+            return fits, before.chi_square - LEAST_GAIN * gain
+    return {}, 0.0

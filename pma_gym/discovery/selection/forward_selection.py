@@ -17,6 +17,7 @@ from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
 from pma_gym.discovery.fitting.covariance import covariance
 from pma_gym.discovery.fitting.fit_problem import FitProblem, Fitted
 from pma_gym.discovery.fitting.journal import Journal
+from pma_gym.discovery.fitting.short_pieces import in_short_pieces
 from pma_gym.discovery.result.estimates import Undetermined
 from pma_gym.discovery.screening.probe_scores import Baseline
 from pma_gym.discovery.screening.residuals import (
@@ -29,13 +30,14 @@ from pma_gym.discovery.screening.scan_statistic import NO_EXCESS, ScanStatistic
 from pma_gym.discovery.screening.score_test import ScreeningScore, screen
 from pma_gym.discovery.screening.starting_points import refined_score
 from pma_gym.discovery.selection.candidate_fits import (
+    MOST_LEFT,
     better,
     cost,
     probed,
     refit,
     without_idle,
 )
-from pma_gym.discovery.selection.exchanged_effects import exchanged
+from pma_gym.discovery.selection.exchanged_effects import Round, exchanged
 from pma_gym.discovery.selection.rugged_fits import is_rugged, settled
 from pma_gym.discovery.selection.scanned_parameters import with_scanned
 from pma_gym.discovery.selection.tried_candidates import Progress, Tried, fits_of_candidates
@@ -69,6 +71,9 @@ BEGINNINGS = 3
 MOST_EFFECTS = 3
 """Most effects that are added."""
 
+SHORT_PIECES = 40
+"""How many short pieces of a free rig's trials are searched first."""
+
 CARRIED = 0.5
 """Share of the bursts in a residual that a fit must explain, where they alone opened the gate:
 noise that is larger in places bursts too, and no effect explains half of that."""
@@ -90,6 +95,8 @@ class Stage:
         unfitted: candidates that could not be fitted: their range, simulated, promises more than
             any fit brings, and their own fits bring far less although a refit keeps the promise.
         scanned: candidates that were fitted with held parameters at other values, by name.
+        scale: how many times as large chi-square is in the trials; not 1 where the round was of
+            short pieces of them.
     """
 
     problem: FitProblem
@@ -102,6 +109,7 @@ class Stage:
     scan: ScanStatistic = NO_EXCESS
     unfitted: tuple[str, ...] = ()
     scanned: Mapping[str, CandidateEffect] = field(default_factory=dict)
+    scale: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -144,10 +152,86 @@ def select(
         journal: keeps fits.
         progress: called with a step's name, what is done and the total.
     """
-    chosen: tuple[CandidateEffect, ...] = ()
-    stages: list[Stage] = []
-    begun: list[str] = []
-    best = refitted
+    begun = Added((), (), refitted, refitted)
+    if problem.given.rig.is_free and problem.far(refitted):
+        begun = _begun_in_short_pieces(problem, begun, candidates, seed, journal, progress)
+    added = _with_added(problem, begun, candidates, seed, journal, progress)
+    chosen, best, refitted = added.chosen, added.fit, added.refitted
+    # The last was the best beside all others already.
+    rounds, places = _rounds(added.stages), range(len(chosen) - 1)
+    chosen, best = exchanged(problem, best, chosen, rounds, candidates, places)
+    problem = replace(problem, noise=reestimated_noise(problem, best, chosen))
+    fit = refit(problem, best, chosen, journal)
+    if is_rugged(fit, chosen):
+        fit = settled(problem, replace(fit, spread=best.spread), chosen)
+    fit = replace(fit, covariance=covariance(problem, fit, chosen))
+    return Selection(added.stages, chosen, fit, problem, refitted)
+
+
+@dataclass(frozen=True)
+class Added:
+    """Effects that were added one after the other: as `Selection`, before its last fits.
+
+    Attributes:
+        chosen: the effects.
+        stages: the rounds.
+        fit: the model with them.
+        refitted: the model with its own parameters refitted alone.
+    """
+
+    chosen: tuple[CandidateEffect, ...]
+    stages: tuple[Stage, ...]
+    fit: Fitted
+    refitted: Fitted
+
+
+def _begun_in_short_pieces(
+    problem: FitProblem,
+    begun: Added,
+    candidates: Sequence[CandidateEffect],
+    seed: int,
+    journal: Journal,
+    progress: Progress,
+) -> Added:
+    """What short pieces of a free rig's trials say is missing, where that holds for the trials.
+
+    In a second an error of force leads a free rig so far away that fits of the right effect end in
+    local minima, and that effects beside it do not show. In a quarter of a second it does not.
+    """
+    short = in_short_pieces(problem, SHORT_PIECES)
+    refitted = short.careful_fit(problem.given)
+    if short is problem or refitted is None:
+        return begun
+    first = Added((), (), refitted, refitted)
+    added = _with_added(short, first, candidates, seed, journal, progress)
+    chosen, scale = added.chosen, begun.fit.chi_square / added.refitted.chi_square
+    stages = tuple(replace(each, scale=scale) for each in added.stages[: len(chosen)])
+    if not chosen:
+        return begun
+    fit = problem.fit(added.fit.model, chosen)
+    if fit is None or not fit.chi_square < MOST_LEFT * begun.fit.chi_square:
+        return begun
+    # What explains most in short pieces need not in longer ones.
+    places = range(len(chosen))
+    chosen, fit = exchanged(problem, fit, chosen, _rounds(stages), candidates, places)
+    return replace(begun, chosen=chosen, stages=stages, fit=replace(fit, spread=added.fit.spread))
+
+
+def _rounds(stages: Sequence[Stage]) -> list[Round]:
+    return [(each.before, each.fits) for each in stages]
+
+
+def _with_added(
+    problem: FitProblem,
+    begun: Added,
+    candidates: Sequence[CandidateEffect],
+    seed: int,
+    journal: Journal,
+    progress: Progress,
+) -> Added:
+    """With all effects that the residual asks for, beside those there are."""
+    chosen, stages = begun.chosen, list(begun.stages)
+    best, refitted, anew = begun.fit, begun.refitted, 0
     while len(chosen) < MOST_EFFECTS:
         taken = {candidate.name for candidate in chosen}
         rest = [candidate for candidate in candidates if candidate.name not in taken]
@@ -158,23 +242,17 @@ def select(
             break
         new = next(each for each in candidates if each.name == added)
         chosen = (*chosen, stage.scanned.get(added, new))
-        best = better(problem, stage.fits[added], chosen, journal)
+        best = better(problem, stage.fits[added], chosen, stage.before, journal)
         chosen, best = with_scanned(problem, best, chosen, journal)
         chosen, best = without_idle(problem, best, chosen, refitted, journal)
-        if not chosen and best.chi_square < refitted.chi_square and len(begun) < BEGINNINGS:
+        if not chosen and best.chi_square < refitted.chi_square and anew < BEGINNINGS:
             # The fit without effects was in a local minimum; restart from the better parameters.
             refitted, stages = best, []
-            begun.append(added)
+            anew += 1
         elif len(chosen) < len(stages):
             # One is not missed beside the other, and that is the end of it.
             break
-    chosen, best = exchanged(problem, best, chosen, [each.fits for each in stages], candidates)
-    problem = replace(problem, noise=reestimated_noise(problem, best, chosen))
-    fit = refit(problem, best, chosen, journal)
-    if is_rugged(fit, chosen):
-        fit = settled(problem, replace(fit, spread=best.spread), chosen)
-    fit = replace(fit, covariance=covariance(problem, fit, chosen))
-    return Selection(tuple(stages), chosen, fit, problem, refitted)
+    return Added(chosen, tuple(stages), best, refitted)
 
 
 def _stage(
@@ -217,7 +295,9 @@ def _stage(
     tried = Tried()
     if gate:
         beside = problem, baseline, before, chosen
-        tried = fits_of_candidates(*beside, scores, far, not astray, journal, progress)
+        # Short pieces of a free rig's trials lead second fits out of local minima already.
+        restarts = not astray and not (problem.given.rig.is_free and chosen)
+        tried = fits_of_candidates(*beside, scores, far, restarts, journal, progress)
     gains = [before.chi_square - fit.chi_square for fit in tried.fits.values()]
     if scan.excess and all(gain < least for gain in gains):
         gate, tried, scores, scan = (), replace(tried, fits={}), plainly, NO_EXCESS
@@ -314,6 +394,6 @@ def _likeliest(stage: Stage, first: Stage) -> str | None:
     if stage is not first and not _carries_the_rest(stage, gain):
         least = min(first.fits.values(), key=cost)
         share = SURE_SHARE if stage.missing else SECOND_SHARE
-        if gain < share * (first.before.chi_square - least.chi_square):
+        if gain < share * first.scale * (first.before.chi_square - least.chi_square):
             return None
     return name

@@ -6,8 +6,8 @@ the parameter is not determined: it is held at that limit, the fit is repeated w
 value is given for it, only the bound that the profile has on the other side. An effect may also
 say that a simpler law of its own sets one parameter equal to another (`Effect.ties`); the whole law
 stays where it explains more than its further parameters cost, of readings left out too, and where
-the parameter that may be equal is not at an end of its range: a static friction of 0 N borrows the
-law's form for something else.
+the parameter that may be equal is neither below the other nor at an end of its range: a static
+friction of 0 N, or below the dynamic one, borrows the law's form for something else.
 """
 
 from dataclasses import replace
@@ -122,6 +122,7 @@ def _tied(problem: FitProblem, state: Nested, place: int) -> Nested | None:
         # What the whole law explains more must be worth its parameters, as anywhere.
         if simpler is not None and (
             cost(simpler.fit) < cost(state.fit)
+            or state.fit.estimate(tie.path)[0] < state.fit.estimate(tie.twin)[0]
             or _ended(problem, state, tie.path)
             or not _asked_for(problem, state, simpler)
         ):

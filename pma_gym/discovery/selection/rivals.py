@@ -79,5 +79,5 @@ def rivals(
         if fit is None:
             continue
         behind = cost(fit) - cost(best)
-        ranked.append(Rival(candidate, fit, behind, behind < max(NEAREST, NEAREST_SHARE * gain)))
+        ranked.append(Rival(candidate, fit, behind, behind < max(NEAREST, NEAREST_SHARE * stage.scale * gain)))
     return sorted(ranked, key=lambda rival: rival.behind)

@@ -61,19 +61,23 @@ def is_rugged(fit: Fitted, chosen: Chosen) -> bool:
     return not fit.converged and any(True for each in chosen for _ in ties(each))
 
 
-def best_of_optima(problem: FitProblem, fit: Fitted, chosen: Chosen) -> Fitted:
+def best_of_optima(
+    problem: FitProblem, fit: Fitted, chosen: Chosen, refines: bool = True
+) -> Fitted:
     """The least of the minima that several starts lead to, with the spread of the equal ones.
 
     Args:
         problem: the trials.
         fit: a fit that did not converge; one of the starts.
         chosen: the effects in it.
+        refines: whether the best fits are refined without derivatives, which takes longest.
     """
     smooth = in_short_pieces(problem) if problem.given.rig.is_free else problem
     begun = sorted(_fits_from_simpler_laws(smooth, fit, chosen), key=_chi_square)
     fits = [fit, *filter(None, (problem.fit(each.model, chosen) for each in begun[:FITTED]))]
     fits.sort(key=_chi_square)
-    fits[:REFINED] = [refined(problem, each, chosen) for each in fits[:REFINED]]
+    if refines:
+        fits[:REFINED] = [refined(problem, each, chosen) for each in fits[:REFINED]]
     best = min(fits, key=_chi_square)
     ends = [_interval(smooth, each, chosen) for each in _equals(smooth, begun, chosen)] + [
         _interval(problem, each, chosen) for each in _equals(problem, fits, chosen)

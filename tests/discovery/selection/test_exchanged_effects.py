@@ -65,13 +65,15 @@ def test_a_spring_gives_way_to_the_hardening_spring_that_it_stood_for(problem):
     starts = {each.name: each.probes[0] for each in chosen}
     fit = problem.fit(problem.given, chosen, starts)
     assert problem.left(fit) > 1.2
-    after, best = exchanged(problem, fit, chosen, [fits, {}], list(known.values()))
+    alone = problem.fit(problem.given)
+    beside = list(known.values())
+    after, best = exchanged(problem, fit, chosen, [(alone, fits), (alone, {})], beside, [0])
     assert [each.name for each in after] == ["joint_hardening_spring", "joint_directional_damping"]
     assert problem.left(best) < 1.1
     cubic, _ = best.estimate("joint_hardening_spring.cubic_n_m_per_rad3")
     assert cubic == pytest.approx(8.0, rel=0.05)
     # What explains most already stays.
-    again, same = exchanged(problem, best, after, [fits, {}], list(known.values()))
+    again, same = exchanged(problem, best, after, [(alone, fits), (alone, {})], beside, [0])
     assert again == after and same is best
 
 
