@@ -79,5 +79,6 @@ def rivals(
         if fit is None:
             continue
         behind = cost(fit) - cost(best)
-        ranked.append(Rival(candidate, fit, behind, behind < max(NEAREST, NEAREST_SHARE * stage.scale * gain)))
+        equal = behind < max(NEAREST, NEAREST_SHARE * stage.scale * gain)
+        ranked.append(Rival(candidate, fit, behind, equal))
     return sorted(ranked, key=lambda rival: rival.behind)
