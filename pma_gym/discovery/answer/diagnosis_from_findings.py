@@ -38,6 +38,7 @@ from pma_gym.discovery.verdict.residual_fraction import ResidualFraction, residu
 from pma_gym.discovery.verdict.residual_laws import residual_law
 from pma_gym.discovery.verdict.unknown import (
     Reason,
+    leaves_structure,
     shapeless_laws,
     telling,
     why_unknown,
@@ -146,10 +147,13 @@ def _decision(findings: Findings, left: ResidualFraction) -> _Decision:
         else parameters_off(findings, findings.elimination.fit)
     )
     off = any(moved.significant for moved in parameters.values())
-    unknown = why_unknown(findings, left, laws)
-    verdict = verdict_of(findings, unknown, not_detectable, bool(coarse), off)
     records = trial_records(findings)
-    closes = closing(gaps(records), unknown.effects) if unknown and unknown.effects else None
+    by_signal = gaps(records)
+    unknown = why_unknown(findings, left, laws) or leaves_structure(findings, left, by_signal)
+    verdict = verdict_of(findings, unknown, not_detectable, bool(coarse), off)
+    chosen = tuple(candidate.name for candidate in findings.selection.chosen)
+    is_right = unknown is None and findings.adequacy.structure is None
+    closes = None if is_right or not chosen else closing(by_signal, chosen)
     if closes is not None and closes.named and widest_scatter(findings) <= MOST_SCATTER:
         # An approximate law is a name where a right one would be; else the verdict stays.
         named = verdict_of(findings, None, not_detectable, bool(coarse), off)

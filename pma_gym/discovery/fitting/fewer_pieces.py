@@ -16,9 +16,9 @@ PIECES = 8
 
 def with_fewer_pieces(problem: FitProblem) -> FitProblem:
     """The same problem with at most half of its pieces; as it is where trials are whole, or few."""
-    files = len(set(problem.files))
+    files = len(set(problem.files)) or len(problem.trials)
     count = max(PIECES, files)
-    if files == len(problem.trials) or 2 * count > len(problem.trials):
+    if 2 * count > len(problem.trials):
         return problem
     # In the middle of equal shares.
     edges = np.linspace(0.0, len(problem.trials), count + 1)

@@ -44,6 +44,10 @@ MOST_LEFT = 0.1
 """Share of chi-square that an effect leaves at most where it carries most of a misfit: a third of
 the residual."""
 
+MUCH, MOST_OF = 2.0, 0.8
+"""Noises left from which on another effect counts that carries this share of what is left beyond
+the noise: an approximate law leaves less, and no other law carries that."""
+
 COST = 3.0
 """Log-likelihood that a parameter costs: half the logarithm of some 400 effective readings."""
 
@@ -51,6 +55,11 @@ COST = 3.0
 def cost(fit: Fitted) -> float:
     """Twice the negative log-likelihood, with what parameters cost."""
     return fit.chi_square + 2.0 * COST * len(fit.paths)
+
+
+def carries_the_rest(problem: FitProblem, before: Fitted, gain: float) -> bool:
+    """Whether a fall of chi-square is most of what a fit leaves, where it leaves much."""
+    return problem.left(before) > MUCH and gain > MOST_OF * (before.chi_square - problem.count)
 
 
 def starting_values(candidate: CandidateEffect, *fits: Fitted) -> np.ndarray:
@@ -353,6 +362,7 @@ def without_idle(
         if without is None:
             continue
         missed = without.chi_square - best.chi_square
-        if missed < max(30.0, 0.02 * max(worst - best.chi_square, 0.0)):
+        idle = missed < max(30.0, 0.02 * max(worst - best.chi_square, 0.0))
+        if idle and not carries_the_rest(problem, without, missed):
             return others, refit(problem, without, others, journal)
     return chosen, best

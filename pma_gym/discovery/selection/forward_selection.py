@@ -6,8 +6,10 @@ data sets. It opens too where the residual itself is no noise: where it is many 
 are too large for noise (`scan_statistic`) and an effect explains them. What passes is fitted
 together with the model's parameters; the likeliest is added; then the same again beside it. Each
 effect is then left out once, and stays out if the fit is as good without it, or is exchanged for
-another that explains more beside the rest. The noise is estimated again only when all effects are
-selected: before, an autoregression would take the next effect for noise.
+another that explains more beside the rest. Where a free rig is far from its trials all this happens
+in short pieces of them first, and goes on in the trials beside what holds there. The noise is
+estimated again only when all effects are selected: before, an autoregression would take the next
+effect for noise.
 """
 
 from collections.abc import Mapping, Sequence
@@ -32,6 +34,7 @@ from pma_gym.discovery.screening.starting_points import refined_score
 from pma_gym.discovery.selection.candidate_fits import (
     MOST_LEFT,
     better,
+    carries_the_rest,
     cost,
     probed,
     refit,
@@ -60,10 +63,6 @@ noise, and follows the motion."""
 SECOND_SHARE, SURE_SHARE = 0.12, 0.02
 """Least share of the first effect's gain that another must bring: what a law of the catalogue
 misses of its real likeness is of that order; and the same where the residual is surely no noise."""
-
-MUCH, MOST_OF = 2.0, 0.8
-"""Noises left from which on another effect counts that carries this share of what is left beyond
-the noise: an approximate law leaves less, and no other law carries that."""
 
 BEGINNINGS = 3
 """How often the selection begins anew from a better refitted model."""
@@ -367,12 +366,6 @@ def _least_change(problem: FitProblem) -> float:
     return PIECES_CHANGE if in_pieces else LEAST_CHANGE
 
 
-def _carries_the_rest(stage: Stage, gain: float) -> bool:
-    """Whether chi-square falls by most of what much more than noise is left."""
-    left = stage.before.chi_square - stage.problem.count
-    return stage.problem.left(stage.before) > MUCH and gain > MOST_OF * left
-
-
 def _likeliest(stage: Stage, first: Stage) -> str | None:
     """The candidate to add, or None."""
     if not stage.gate or not stage.fits:
@@ -391,7 +384,7 @@ def _likeliest(stage: Stage, first: Stage) -> str | None:
     gain = stage.before.chi_square - stage.fits[name].chi_square
     if gain < 30.0:
         return None
-    if stage is not first and not _carries_the_rest(stage, gain):
+    if stage is not first and not carries_the_rest(stage.problem, stage.before, gain):
         least = min(first.fits.values(), key=cost)
         share = SURE_SHARE if stage.missing else SECOND_SHARE
         if gain < share * first.scale * (first.before.chi_square - least.chi_square):

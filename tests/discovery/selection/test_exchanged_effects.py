@@ -13,7 +13,7 @@ from pma_gym.discovery.fitting.free_parameters import free_parameters
 from pma_gym.discovery.preparation.noise import white_noise
 from pma_gym.discovery.preparation.prepared_trials import prepared
 from pma_gym.discovery.screening.candidates import candidate_effects
-from pma_gym.discovery.selection import forward_selection
+from pma_gym.discovery.selection.candidate_fits import carries_the_rest
 from pma_gym.discovery.selection.exchanged_effects import exchanged
 from pma_gym.effects import CATALOGUE
 from pma_gym.plant.model import Model
@@ -81,9 +81,6 @@ def test_a_spring_gives_way_to_the_hardening_spring_that_it_stood_for(problem):
     ("left", "gain", "carries"), [(5.0, 2000.0, True), (5.0, 1500.0, False), (1.8, 220.0, False)]
 )
 def test_a_second_effect_counts_that_carries_nearly_all_of_much(left, gain, carries):
-    chi_square = 100 * left**2
-    stage = SimpleNamespace(
-        before=SimpleNamespace(chi_square=chi_square),
-        problem=SimpleNamespace(count=100, left=lambda fit: (fit.chi_square / 100) ** 0.5),
-    )
-    assert forward_selection._carries_the_rest(stage, gain) is carries
+    before = SimpleNamespace(chi_square=100 * left**2)
+    problem = SimpleNamespace(count=100, left=lambda fit: (fit.chi_square / 100) ** 0.5)
+    assert carries_the_rest(problem, before, gain) is carries

@@ -85,6 +85,16 @@ def test_a_law_with_a_number_at_an_end_of_its_range_is_left(monkeypatch):
     assert less.chosen[0].fitted_paths == [DYNAMIC]
 
 
+def test_a_static_friction_below_the_dynamic_one_leaves_the_law(monkeypatch):
+    """No contact holds less than it drags, even where that form of the law explains more."""
+    monkeypatch.setattr(nested_laws, "_asked_for", lambda *_: True)
+    bench, fit = fit_of(6.0, 12.0, 60.0, (6.0, 12.0, 60.0))
+    assert fit.estimate(STATIC)[0] < 0.8 * fit.estimate(DYNAMIC)[0]
+    less = nested(bench, fit, (DRY,))
+    assert set(less.undetermined) == {STATIC, SPEED}
+    assert less.fit.chi_square > fit.chi_square + 10.0 * FLAT
+
+
 def test_a_speed_beyond_all_speeds_is_only_known_to_lie_above():
     """A static friction that hardly falls: the fall's speed is above something, no more."""
     logs, truth = rubbing(12.0, 4.0, 900.0)

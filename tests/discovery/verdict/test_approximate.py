@@ -3,6 +3,7 @@
 import json
 from dataclasses import replace
 from functools import cache
+from types import SimpleNamespace
 from unittest import mock
 
 import pytest
@@ -13,8 +14,10 @@ from pma_gym.discovery.report.verdict_text import sentence
 from pma_gym.discovery.result.estimates import Approximate, Estimate, NamedEffect
 from pma_gym.discovery.result.misfit import Gap
 from pma_gym.discovery.verdict import approximate
+from pma_gym.discovery.verdict.adequacy import SignalAdequacy
 from pma_gym.discovery.verdict.approximate import LEAST_MISFIT, MOST_LEFT, closing
-from pma_gym.discovery.verdict.unknown import Reason
+from pma_gym.discovery.verdict.residual_fraction import ResidualFraction
+from pma_gym.discovery.verdict.unknown import Reason, leaves_structure
 from pma_gym.discovery.workflow import diagnose
 from pma_gym.plant.plant import Plant
 from tests.discovery.laboratory import STATION, commanded, diagnosed
@@ -71,6 +74,27 @@ def test_terms_of_one_law_count_as_one():
 
 def test_a_share_of_hardly_anything_is_none():
     assert closing(gaps((1.0 + 0.9 * LEAST_MISFIT) ** 0.5, 1.0), ONE) is None
+
+
+@pytest.mark.parametrize(
+    ("after", "structure", "figure"),
+    [
+        (50.0, None, 50.0),  # no floor but the sensor's noise: far beyond that
+        (7.0, None, None),
+        (7.0, SignalAdequacy(None, 7.0, 0.0, 0.0, 6.0, "misfit"), 6.0),
+        (3.0, SignalAdequacy(None, 3.0, 0.0, 0.0, 3.0, "misfit"), None),
+    ],
+)
+def test_effects_that_leave_much_structure_are_not_it(after, structure, figure):
+    findings = SimpleNamespace(
+        selection=SimpleNamespace(chosen=[SimpleNamespace(name="hysteresis")]),
+        adequacy=SimpleNamespace(structure=structure and ("load", structure)),
+    )
+    left = ResidualFraction(0.2, 0.05)
+    reason = leaves_structure(findings, left, gaps(2.0 * after if after > 3.0 else 10.0, after))
+    assert (reason and reason.figure) == figure
+    if reason is not None:
+        assert (reason.why, reason.effects, reason.leaves) == ("misfit", ("hysteresis",), 0.2)
 
 
 @pytest.mark.campaign
