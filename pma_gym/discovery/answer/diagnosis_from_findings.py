@@ -148,12 +148,11 @@ def _decision(findings: Findings, left: ResidualFraction) -> _Decision:
     )
     off = any(moved.significant for moved in parameters.values())
     records = trial_records(findings)
-    by_signal = gaps(records)
-    unknown = why_unknown(findings, left, laws) or leaves_structure(findings, left, by_signal)
+    unknown = why_unknown(findings, left, laws) or leaves_structure(findings, left)
     verdict = verdict_of(findings, unknown, not_detectable, bool(coarse), off)
     chosen = tuple(candidate.name for candidate in findings.selection.chosen)
     is_right = unknown is None and findings.adequacy.structure is None
-    closes = None if is_right or not chosen else closing(by_signal, chosen)
+    closes = None if is_right or not chosen else closing(gaps(records), chosen)
     if closes is not None and closes.named and widest_scatter(findings) <= MOST_SCATTER:
         # An approximate law is a name where a right one would be; else the verdict stays.
         named = verdict_of(findings, None, not_detectable, bool(coarse), off)

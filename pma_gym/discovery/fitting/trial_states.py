@@ -84,7 +84,9 @@ def _started(
         )
 
     reach = SEARCHED * max(abs(about), LEAST_SPEED)
-    best = minimize_scalar(off, bounds=(about - reach, about + reach), method="bounded")
+    (low,), (high,) = bounds([path])
+    around = max(about - reach, low), min(about + reach, high)
+    best = minimize_scalar(off, bounds=around, method="bounded")
     fits_better = best.fun < off(about)  # type: ignore[attr-defined]
     return {**parameters, path: float(best.x) if fits_better else about}  # type: ignore[attr-defined]
 

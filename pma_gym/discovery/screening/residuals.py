@@ -96,13 +96,22 @@ def far_off(problem: FitProblem, fit: Fitted, chosen: Sequence[CandidateEffect] 
 
     Where everything is wrong, turning signs of the residual's pieces tells chance from nothing.
     """
+    return any(size > FAR for size in left_in_noises(problem, fit, chosen).values())
+
+
+def left_in_noises(
+    problem: FitProblem, fit: Fitted, chosen: Sequence[CandidateEffect] = ()
+) -> dict[str, float]:
+    """Root mean square of what a fit leaves of each output, in its noise; 0 where not measured."""
     left = residuals(problem.whitened_residuals(fit.model, chosen), fit)
-    for channel, noise in enumerate(problem.noise):
+    sizes = {}
+    for channel, (signal, noise) in enumerate(
+        zip(fit.model.rig.signals, problem.noise, strict=True)
+    ):
         known = np.concatenate([part[channel] for part in left])
         known = known[np.isfinite(known)]
-        if known.size and np.sqrt(np.mean(known**2)) > FAR * noise.level:
-            return True
-    return False
+        sizes[signal.name] = float(np.sqrt(np.mean(known**2)) / noise.level) if known.size else 0.0
+    return sizes
 
 
 def autocorrelation_tests(

@@ -1,18 +1,16 @@
 """Unknown: whether something is missing that no effect carries, and which figure tells so."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 
 from pma_gym.data.trial_columns import BY_QUANTITY
-from pma_gym.discovery.result.misfit import Gap
 from pma_gym.discovery.screening.autocorrelation import SURE
-from pma_gym.discovery.screening.residuals import FAR, autocorrelation_tests
+from pma_gym.discovery.screening.residuals import FAR, autocorrelation_tests, left_in_noises
 from pma_gym.discovery.verdict.adequacy import MOST_EXPLAINED, MOST_FLOORS
 from pma_gym.discovery.verdict.approximate import MOST_LEFT as MOST_APPROXIMATE
-from pma_gym.discovery.verdict.approximate import closing
 from pma_gym.discovery.verdict.findings import Findings
 from pma_gym.discovery.verdict.homogeneity_test import homogeneity_test
 from pma_gym.discovery.verdict.residual_fraction import ResidualFraction
@@ -105,9 +103,7 @@ def why_unknown(
     return replace(reason, nearest=nearest, leaves=leaves)
 
 
-def leaves_structure(
-    findings: Findings, left: ResidualFraction, gaps: Mapping[str, Gap]
-) -> Reason | None:
+def leaves_structure(findings: Findings, left: ResidualFraction) -> Reason | None:
     """Why effects that passed every other test are not it; None where they are.
 
     What they leave is no noise, and more than an approximate law may leave.
@@ -115,23 +111,27 @@ def leaves_structure(
     Args:
         findings: what the steps found.
         left: what the effects leave of the residual.
-        gaps: misfits, by signal.
     """
-    chosen = tuple(candidate.name for candidate in findings.selection.chosen)
-    closes = closing(gaps, chosen) if chosen else None
-    if closes is None or closes.left <= MOST_APPROXIMATE:
+    problem, chosen = findings.problem, findings.selection.chosen
+    if not chosen:
         return None
-    reason = _inadequate(findings) or _far_off(gaps)
-    return None if reason is None else replace(reason, effects=chosen, leaves=left.slow)
+    before = problem.sum_of_squares(findings.refitted.model) - problem.count
+    after = problem.sum_of_squares(findings.selection.fit.model, chosen) - problem.count
+    if after <= MOST_APPROXIMATE * before:
+        return None
+    reason = _inadequate(findings) or _far_off(findings)
+    names = tuple(candidate.name for candidate in chosen)
+    return None if reason is None else replace(reason, effects=names, leaves=left.slow)
 
 
-def _far_off(gaps: Mapping[str, Gap]) -> Reason | None:
+def _far_off(findings: Findings) -> Reason | None:
     """The residual is no noise by its size, where nothing but the sensor says what noise is."""
-    sizes = {name: gap.after / gap.floor for name, gap in gaps.items() if gap.floor > 0.0}
-    signal = max(sizes, key=lambda name: sizes[name], default=None)
-    if signal is None or sizes[signal] <= FAR:
+    selection = findings.selection
+    sizes = left_in_noises(findings.problem, selection.fit, selection.chosen)
+    name = max(sizes, key=lambda each: sizes[each])
+    if sizes[name] <= FAR:
         return None
-    return Reason("misfit", sizes[signal], FAR, of=signal)
+    return Reason("misfit", sizes[name], FAR, of=BY_QUANTITY[name].name)
 
 
 def _beyond(

@@ -13,7 +13,7 @@ from pma_gym.discovery.report.summary import diagnosis_summary
 from pma_gym.discovery.report.verdict_text import sentence
 from pma_gym.discovery.result.estimates import Approximate, Estimate, NamedEffect
 from pma_gym.discovery.result.misfit import Gap
-from pma_gym.discovery.verdict import approximate
+from pma_gym.discovery.verdict import approximate, unknown
 from pma_gym.discovery.verdict.adequacy import SignalAdequacy
 from pma_gym.discovery.verdict.approximate import LEAST_MISFIT, MOST_LEFT, closing
 from pma_gym.discovery.verdict.residual_fraction import ResidualFraction
@@ -76,25 +76,37 @@ def test_a_share_of_hardly_anything_is_none():
     assert closing(gaps((1.0 + 0.9 * LEAST_MISFIT) ** 0.5, 1.0), ONE) is None
 
 
+JUDGED = SignalAdequacy(None, 6.0, 0.0, 0.0, 6.0, "misfit")
+
+
 @pytest.mark.parametrize(
     ("after", "structure", "figure"),
     [
         (50.0, None, 50.0),  # no floor but the sensor's noise: far beyond that
         (7.0, None, None),
-        (7.0, SignalAdequacy(None, 7.0, 0.0, 0.0, 6.0, "misfit"), 6.0),
-        (3.0, SignalAdequacy(None, 3.0, 0.0, 0.0, 3.0, "misfit"), None),
+        (7.0, JUDGED, 6.0),
+        (3.0, JUDGED, None),
     ],
 )
-def test_effects_that_leave_much_structure_are_not_it(after, structure, figure):
+def test_effects_that_leave_much_structure_are_not_it(after, structure, figure, monkeypatch):
+    """Of 10 noises, or twice what is left where that is more."""
+    before = max(10.0, 2.0 * after)
+    problem = SimpleNamespace(count=100, sum_of_squares=lambda model, *_: 100 * model**2)
+    selection = SimpleNamespace(
+        chosen=[SimpleNamespace(name="hysteresis")], fit=SimpleNamespace(model=after)
+    )
     findings = SimpleNamespace(
-        selection=SimpleNamespace(chosen=[SimpleNamespace(name="hysteresis")]),
+        problem=problem,
+        refitted=SimpleNamespace(model=before),
+        selection=selection,
         adequacy=SimpleNamespace(structure=structure and ("load", structure)),
     )
-    left = ResidualFraction(0.2, 0.05)
-    reason = leaves_structure(findings, left, gaps(2.0 * after if after > 3.0 else 10.0, after))
+    monkeypatch.setattr(unknown, "left_in_noises", lambda *_: {"load": after, "rotation": 0.0})
+    reason = leaves_structure(findings, ResidualFraction(0.2, 0.05))
     assert (reason and reason.figure) == figure
     if reason is not None:
-        assert (reason.why, reason.effects, reason.leaves) == ("misfit", ("hysteresis",), 0.2)
+        said = (reason.why, reason.of, reason.effects, reason.leaves)
+        assert said == ("misfit", "load_n", ("hysteresis",), 0.2)
 
 
 @pytest.mark.campaign
