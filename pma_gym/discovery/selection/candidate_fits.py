@@ -44,7 +44,7 @@ MOST_LEFT = 0.1
 """Share of chi-square that an effect leaves at most where it carries most of a misfit: a third of
 the residual."""
 
-MUCH, MOST_OF = 2.0, 0.8
+MUCH, MOST_OF = 1.05, 0.8
 """Noises left from which on another effect counts that carries this share of what is left beyond
 the noise: an approximate law leaves less, and no other law carries that."""
 

@@ -78,7 +78,8 @@ def test_a_spring_gives_way_to_the_hardening_spring_that_it_stood_for(problem):
 
 
 @pytest.mark.parametrize(
-    ("left", "gain", "carries"), [(5.0, 2000.0, True), (5.0, 1500.0, False), (1.8, 220.0, False)]
+    ("left", "gain", "carries"),
+    [(5.0, 2000.0, True), (5.0, 1500.0, False), (1.2, 40.0, True), (1.04, 8.0, False)],
 )
 def test_a_second_effect_counts_that_carries_nearly_all_of_much(left, gain, carries):
     before = SimpleNamespace(chi_square=100 * left**2)
