@@ -19,7 +19,7 @@ from pma_gym.discovery.fitting.free_parameters import FreeParameters
 from pma_gym.discovery.preparation.noise import Whitening, white_noise
 from pma_gym.discovery.screening import residuals, scan_statistic
 from pma_gym.discovery.screening.score_test import ScreeningScore
-from pma_gym.discovery.selection import forward_selection
+from pma_gym.discovery.selection import stages
 from pma_gym.plant.model import Model
 
 Array = NDArray[np.float64]
@@ -58,12 +58,12 @@ def no_refit(dataset: Dataset, seed: int, jobs: int) -> Mapping[str, Any]:
 
 def no_gate(dataset: Dataset, seed: int, jobs: int) -> Mapping[str, Any]:
     """Without the simulated chance: every effect passes that changes enough, as if sure."""
-    whole = forward_selection.screen
+    whole = stages.screen
 
     def sure(*args: Any, **options: Any) -> list[ScreeningScore]:  # noqa: ANN401
         return [replace(each, p_value=0.0) for each in whole(*args, **options)]
 
-    with _instead(forward_selection, "screen", sure):
+    with _instead(stages, "screen", sure):
         return ours(dataset, seed, jobs)
 
 

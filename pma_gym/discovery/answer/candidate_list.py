@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 from pma_gym.discovery.result.candidate import ADDED, UNFITTED, Candidate
 from pma_gym.discovery.screening.score_test import ScreeningScore
-from pma_gym.discovery.selection.forward_selection import passes
+from pma_gym.discovery.selection.stages import passes
 from pma_gym.discovery.verdict.findings import Findings
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
 from pma_gym.discovery.fitting.fit_problem import FitProblem, Fitted
 from pma_gym.discovery.selection.candidate_fits import cost, starting_values, stripped
-from pma_gym.discovery.selection.forward_selection import Stage
+from pma_gym.discovery.selection.stages import Stage
 
 NEAREST = 12.0
 """Chi-square within which two effects are not identifiable: odds of 400 to 1."""

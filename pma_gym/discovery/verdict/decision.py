@@ -6,7 +6,7 @@ import numpy as np
 
 from pma_gym.discovery.diagnosis import Verdict
 from pma_gym.discovery.fitting.free_parameters import values
-from pma_gym.discovery.selection.forward_selection import LEAST_CHANGE
+from pma_gym.discovery.selection.stages import LEAST_CHANGE
 from pma_gym.discovery.verdict.findings import Findings
 from pma_gym.discovery.verdict.unknown import Reason, gate
 

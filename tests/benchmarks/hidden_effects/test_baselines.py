@@ -31,7 +31,7 @@ from pma_gym.discovery.fitting.fit_problem import FitProblem
 from pma_gym.discovery.fitting.free_parameters import free_parameters
 from pma_gym.discovery.preparation.noise import white_noise
 from pma_gym.discovery.screening import residuals, scan_statistic
-from pma_gym.discovery.selection import forward_selection
+from pma_gym.discovery.selection import stages
 from pma_gym.plant.model import load_model
 
 JUDGED = (1, 2, 3, 5, 101, 202)
@@ -176,7 +176,7 @@ def test_each_part_is_off_while_a_diagnosis_runs_and_on_again(monkeypatch, datas
     def spied(*_, **__):
         own = workflow.free_parameters(ready.problem.given)
         noise = residuals.autoregression([np.sin(np.arange(400.0))], 0.1)
-        seen.update(prior=own.prior, noise=noise, chance=forward_selection.screen()[0].p_value)
+        seen.update(prior=own.prior, noise=noise, chance=stages.screen()[0].p_value)
         seen["bursts"] = scan_statistic.autoregression([np.sin(np.arange(400.0))], 0.1)
 
         class Nothing:
@@ -185,8 +185,8 @@ def test_each_part_is_off_while_a_diagnosis_runs_and_on_again(monkeypatch, datas
 
         return Nothing()
 
-    score = forward_selection.ScreeningScore(ready.catalogue[0], 7.9, 0.3, 0, 1.0, 1.0, None, ())
-    monkeypatch.setattr(forward_selection, "screen", lambda: [score])
+    score = stages.ScreeningScore(ready.catalogue[0], 7.9, 0.3, 0, 1.0, 1.0, None, ())
+    monkeypatch.setattr(stages, "screen", lambda: [score])
     monkeypatch.setattr(ablations, "diagnose", spied)
     ablations.ours(dataset, 0, 1)
     prior, memory = seen["prior"], seen["noise"].coefficients
@@ -197,9 +197,9 @@ def test_each_part_is_off_while_a_diagnosis_runs_and_on_again(monkeypatch, datas
     ablations.no_whitening(dataset, 0, 1)
     assert seen["bursts"] == seen["noise"] == white_noise(pytest.approx(np.sqrt(0.5), rel=0.01))
     assert seen["chance"] == 0.3
-    whole = forward_selection.screen
+    whole = stages.screen
     ablations.no_gate(dataset, 0, 1)
-    assert seen["chance"] == 0.0 and forward_selection.screen is whole
+    assert seen["chance"] == 0.0 and stages.screen is whole
     ablations.ours(dataset, 0, 1)
     assert np.array_equal(seen["prior"], prior) and seen["noise"].coefficients == memory
 

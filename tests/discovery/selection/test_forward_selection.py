@@ -13,10 +13,11 @@ from pma_gym.discovery.fitting.journal import Journal
 from pma_gym.discovery.screening.candidates import candidate_effects
 from pma_gym.discovery.screening.residuals import is_autocorrelated, scan_of_fit
 from pma_gym.discovery.screening.score_test import ScreeningScore
-from pma_gym.discovery.selection import forward_selection
+from pma_gym.discovery.selection import stages
 from pma_gym.discovery.selection.candidate_fits import cost
-from pma_gym.discovery.selection.forward_selection import ALARM, passes, select
+from pma_gym.discovery.selection.forward_selection import select
 from pma_gym.discovery.selection.kept_fits import kept_form, restored
+from pma_gym.discovery.selection.stages import ALARM, passes
 from pma_gym.plant.plant import Plant
 from tests.discovery.laboratory import HYSTERESIS, OFF, STATION, commanded, fit_problem, laboratory
 
@@ -164,7 +165,7 @@ def taut(effects, rate=128.0):
 
 def by_bursts_alone(trials, monkeypatch):
     """A selection for which no score passes the gate."""
-    monkeypatch.setattr(forward_selection, "ALARM", -1.0)
+    monkeypatch.setattr(stages, "ALARM", -1.0)
     shared = fit_problem(trials)
     refitted = shared.careful_fit(STATION)
     assert not is_autocorrelated(shared, refitted)
