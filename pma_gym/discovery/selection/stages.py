@@ -82,17 +82,7 @@ def stage_of(
     journal: Journal,
     progress: Progress,
 ) -> Stage:
-    """One round.
-
-    Args:
-        problem: the trials.
-        before: the model that candidates are tried beside.
-        chosen: the effects in it.
-        rest: the candidates.
-        seed: of simulated residuals.
-        journal: keeps fits.
-        progress: called with a step's name, what is done and the total.
-    """
+    """One round of candidates (`rest`) beside a model with some effects (`before`, `chosen`)."""
     shared, astray = problem, problem.astray(before)
     if astray:
         problem, before = _as_assumed(problem, before, chosen)
