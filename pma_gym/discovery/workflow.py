@@ -133,7 +133,7 @@ class _Work:
         trials = [each.trial for each in named]
         given, slower = with_recorded_bandwidth(given, trials)
         words = (*(dataset.checked or ()), *words, *slower)
-        journal = Journal(self.folder, trials, given, f"diagnosis 3 seed {self.seed}")
+        journal = Journal(self.folder, trials, given, f"diagnosis 4 seed {self.seed}")
         logged = [Logged.of(given, i, trial) for i, trial in enumerate(trials)]
         floors = self._timed("noise", lambda: initial_floors(given, logged, named, dataset.sensors))
         own = free_parameters(given)

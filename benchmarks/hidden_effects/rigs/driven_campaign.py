@@ -18,8 +18,8 @@ from benchmarks.hidden_effects.rigs.simulators import mujoco_axis, stick_slip
 from benchmarks.hidden_effects.rigs.simulators.drive import Transmission
 from benchmarks.hidden_effects.rigs.simulators.stick_slip import Motion
 
-UNTOLD = 0.1
-"""Share of a sensor's noise below which the error of a simulation must stay: nobody tells it."""
+ERROR_SHARE = 0.1
+"""Error of a simulated position at most, as a share of the sensor's noise."""
 
 PILOT = 12.0
 """Seconds of the first file by which an effect's size is counted, and two periods."""
@@ -158,7 +158,7 @@ class DrivenCampaign:
     def _mujoco_step(self) -> float:
         """Longest step whose errors the sensor does not tell (s)."""
         acceleration = self.rig.peak_force / self.rig.inertia
-        return mujoco_axis.step_within(UNTOLD * self.sensor.rms, acceleration)
+        return mujoco_axis.step_within(ERROR_SHARE * self.sensor.rms, acceleration)
 
     def _noise(self, i: int) -> np.ndarray:
         rng = np.random.default_rng((*self.seed, i, 7))

@@ -152,6 +152,11 @@ class FitProblem:
         """The whole trial that a trial is a piece of."""
         return self.wholes[number] if self.wholes else number
 
+    @property
+    def journal_key(self) -> str:
+        """What tells its fits from those of the same diagnosis with other noise or other pieces."""
+        return f"{self.noise}{f' pieces of {self.wholes}' if self.wholes else ''}"
+
     @cached_property
     def count(self) -> int:
         """How many readings there are."""

@@ -97,8 +97,8 @@ def fitted(
     caught: bool = False,
 ) -> Fitted | None:
     """The best of fits from the probes that explain most; of more where others were caught."""
-    begun_at = f"{before.names} {before.values.tolist()}"
-    key = f"{problem.noise} {begun_at} {each.candidate.name} {each.starts}{' caught' * caught}"
+    begun_at = f"{problem.journal_key} {before.names} {before.values.tolist()}"
+    key = f"{begun_at} {each.candidate.name} {each.starts}{' caught' * caught}"
     extra = (*chosen, each.candidate)
     kept = journal.restored(key, lambda entry: restored(entry, problem, before, extra))
     if kept is not None:
@@ -330,7 +330,7 @@ def _once(
     search: Callable[[], Fitted],
 ) -> Fitted:
     """What a search from a fit found, from the journal where it was made before."""
-    key = f"{what} {problem.noise} {fit.names} {fit.values.tolist()}"
+    key = f"{what} {problem.journal_key} {fit.names} {fit.values.tolist()}"
     kept = journal.restored(key, lambda entry: restored(entry, problem, fit, chosen))
     if kept is not None:
         return kept

@@ -12,6 +12,9 @@ from benchmarks.hidden_effects.rigs.simulators import stick_slip
 from benchmarks.hidden_effects.rigs.simulators.drive import Transmission
 from pma_gym.data.trial import Trial
 from pma_gym.discovery.fitting.fewer_pieces import PIECES, with_fewer_pieces
+from pma_gym.discovery.fitting.journal import Journal
+from pma_gym.discovery.fitting.short_pieces import in_short_pieces
+from pma_gym.discovery.selection.candidate_fits import refit
 from pma_gym.discovery.workflow import diagnose
 from pma_gym.effects import CATALOGUE
 from pma_gym.plant.model import Model
@@ -61,6 +64,20 @@ def test_friction_and_damping_by_direction_are_found_together():
     assert dynamic == pytest.approx(8.0, rel=0.05)
     difference = named["directional_damping"].parameters["difference_n_s_per_mm"].value
     assert abs(difference) == pytest.approx(0.012, rel=0.1)
+
+
+def test_a_journal_tells_fits_of_short_pieces_from_those_of_the_trials(tmp_path):
+    """Also where both begin, or end, at the same values."""
+    problem = problem_of([*driven_slide(12.0, lanes=2, seconds=2.0, rate=50)])
+    short = in_short_pieces(problem)
+    begun = problem.fit(problem.given)
+    assert begun is not None
+    journal = Journal(tmp_path, problem.trials, problem.given, "one question")
+    both = {id(each): refit(each, begun, (), journal) for each in (short, problem)}
+    assert both[id(short)].chi_square != both[id(problem)].chi_square
+    for each in (short, problem):
+        again = refit(each, begun, (), journal)
+        assert again.chi_square == both[id(each)].chi_square == each.fit(begun.model).chi_square
 
 
 def test_searches_use_at_most_half_of_the_pieces_evenly():
