@@ -29,6 +29,8 @@ class CandidateEffect:
         signs: for each probe, whether the opposite makes sense too.
         own: values (SI) that a parameter has in each trial, by path.
         left: paths that left the law because the trials do not determine them (`nested_laws`).
+        lowest: least values (file unit) that trials of this way can show, by path, where those are
+            above what the catalogue allows.
     """
 
     name: str
@@ -42,12 +44,19 @@ class CandidateEffect:
     signs: NDArray[np.bool_]
     own: Mapping[str, Sequence[float]] = field(default_factory=dict)
     left: tuple[str, ...] = ()
+    lowest: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def fitted_paths(self) -> list[str]:
         """Paths of the parameters that are fitted."""
         pairs = zip(self.paths, self.fitted, strict=True)
         return [path for path, free in pairs if free and path not in self.left]
+
+    @property
+    def bounds(self) -> tuple[Array, Array]:
+        """Least and largest values of `paths` in file units, shape (p,) each."""
+        lower, upper = bounds(self.paths)
+        return np.maximum(lower, [self.lowest.get(path, -np.inf) for path in self.paths]), upper
 
     def beside(self, model: Model) -> Model:
         """Another model with this effect where it does nothing."""
@@ -68,8 +77,7 @@ class CandidateEffect:
                 # The opposite of a wave is the wave half a period later.
                 chosen[at] += 180.0 if chosen[at] <= 0.0 else -180.0
                 chosen[self.amplitudes] = -scaled[self.amplitudes]
-        lower, upper = bounds(self.paths)
-        return np.clip(chosen, lower, upper)
+        return np.clip(chosen, *self.bounds)
 
 
 def bounds(paths: Sequence[str]) -> tuple[Array, Array]:

@@ -115,10 +115,11 @@ class FitProblem:
             trials: which trials; all if not given.
             reach: how many times as wide as assumed beforehand ranges are, by path.
         """
-        paths, own = list(self.own.free), {}
+        paths, own, lowest = list(self.own.free), {}, {}
         for candidate in extra:
             paths += candidate.fitted_paths
             own |= candidate.own
+            lowest |= candidate.lowest
         prior = np.full(len(paths), np.inf)
         prior[: len(self.own.prior)] = self.own.prior
         chosen = range(len(self.trials)) if trials is None else trials
@@ -134,6 +135,7 @@ class FitProblem:
             {path: [each[self._whole(i)] for i in chosen] for path, each in own.items()},
             threads=self.threads,
             reach=reach,
+            lowest=lowest,
         )
 
     def probed(self, model: Model, candidate: CandidateEffect) -> WhitenedResiduals:

@@ -21,8 +21,8 @@ from pma_gym.estimation.logged import Logged
 
 Array = NDArray[np.float64]
 
-LEAST_COSINES, MOST_COSINES = 2, 4
-"""Least and greatest number of cosines of a drift; the least is one period a trial."""
+LEAST_COSINES, MOST_COSINES = 3, 4
+"""Least and greatest number of cosines of a drift; the least hold one period of any phase."""
 
 WANDER, MOST_TURNS = 4e-4, 24
 """How far a line's frequency is off in a trial, as a share of it, and how many half turns of that a

@@ -79,6 +79,7 @@ class WhitenedResiduals(Residuals):
         own: values (SI) that a parameter has in each trial, by path.
         tolerance, interpolation, threads: as `Residuals`.
         reach: how many times as wide as assumed beforehand the range of a parameter is, by path.
+        lowest: least values (file unit) of parameters that the trials can show, by path.
 
     Attributes:
         noise, prior, centre: as given.
@@ -97,11 +98,13 @@ class WhitenedResiduals(Residuals):
         interpolation: Interpolation = "foh",
         threads: int = 1,
         reach: Mapping[str, float] | None = None,
+        lowest: Mapping[str, float] | None = None,
     ) -> None:
         super().__init__(model, trials, free, tolerance, interpolation, threads)
         self.noise, self.prior = tuple(noise), np.asarray(prior, float)
         self.centre = self.start.copy() if centre is None else np.asarray(centre, float)
-        self._possible = self.lower, self.upper
+        shown = np.array([(lowest or {}).get(path, -np.inf) for path in free])
+        self._possible = np.maximum(self.lower, shown), self.upper
         wider = np.array([(reach or {}).get(path, 1.0) for path in free])
         # Beyond lies no rig like this one, and an integrator's hell: a slide of a gram, say.
         self.lower, self.upper = assumed_range(self.centre, self.prior, *self._possible, wider)

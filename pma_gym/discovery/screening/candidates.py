@@ -7,6 +7,7 @@ and sensors that are slower than the model says.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -16,7 +17,7 @@ from pma_gym.data.signals import SIGNALS
 from pma_gym.data.trial import Trial
 from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
 from pma_gym.discovery.fitting.free_parameters import unit, values
-from pma_gym.discovery.screening.usual_sizes import Sizes, sizes
+from pma_gym.discovery.screening.usual_sizes import PERIODIC, Sizes, sizes
 from pma_gym.effects import CATALOGUE, Effect
 from pma_gym.effects.effect import signals
 from pma_gym.effects.ports import measured_output
@@ -137,7 +138,26 @@ def _lacking(
     except ModelError:
         return None
     own = {f"{effect.name}.{file_keys['repeat']}": list(orders or ())} if counted else {}
-    return _candidate(effect.name, effect, extended, file_keys, shown, own)
+    candidate = _candidate(effect.name, effect, extended, file_keys, shown, own)
+    return candidate if sizes is None else _within_way(candidate, sizes)
+
+
+def _within_way(candidate: CandidateEffect, sizes: Sizes) -> CandidateEffect:
+    """A candidate that has as many periods in the trials' way as tell it from a slope."""
+    law = CATALOGUE[candidate.effect]
+    stems = law.names_in_files()
+    lowest = {
+        path: sizes.least_periods(quantity)
+        for path in candidate.paths
+        if (quantity := law.quantities[stems[path.partition(".")[2]]]).unit == PERIODIC
+    }
+    if not lowest:
+        return candidate
+    lower, upper = replace(candidate, lowest=lowest).bounds
+    probes, first = np.unique(np.clip(candidate.probes, lower, upper), axis=0, return_index=True)
+    order = np.argsort(first)
+    kept = first[order]
+    return replace(candidate, lowest=lowest, probes=probes[order], signs=candidate.signs[kept])
 
 
 def _sized(effect: Effect, stem: str, quantity: Quantity, sizes: Sizes) -> Quantity:

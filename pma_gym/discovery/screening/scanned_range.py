@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pma_gym.discovery.fitting.candidate_effect import bounds
 from pma_gym.discovery.preparation.whitened_residuals import WhitenedResiduals
 from pma_gym.discovery.screening.probe_scores import Baseline, probe_scores
 from pma_gym.discovery.screening.score_test import ScreeningScore
@@ -76,7 +75,7 @@ def _range(score: ScreeningScore) -> Array:
     sizes = candidate.amplitudes if candidate.amplitudes.any() else candidate.fitted
     if not sizes.any():
         sizes = np.ones(len(candidate.paths), bool)
-    lower, upper = bounds(candidate.paths)
+    lower, upper = candidate.bounds
     tried = []
     shapes = np.unique(candidate.probes[:, ~sizes], axis=0)
     for place in np.flatnonzero(sizes):

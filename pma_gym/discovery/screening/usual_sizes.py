@@ -31,6 +31,9 @@ SMOOTH_S = 0.03
 LEAST_ROWS = 8
 """Fewest readings of a trial that say how far it goes."""
 
+PERIODIC = "1/m"
+"""Unit of how often a force repeats over the position."""
+
 DIMENSIONS: dict[str, tuple[int, int, int, int]] = {
     "N": (1, 0, 0, 0),
     "N m": (1, 0, 0, 0),
@@ -45,7 +48,7 @@ DIMENSIONS: dict[str, tuple[int, int, int, int]] = {
     "N/kPa": (1, 0, 0, -1),
     "mm/s": (0, 1, 0, 0),
     "deg/s": (0, 1, 0, 0),
-    "1/m": (0, 0, -1, 0),
+    PERIODIC: (0, 0, -1, 0),
 }
 """Powers of force, speed, way and pressure in a unit, for those that scale with them."""
 
@@ -54,6 +57,9 @@ DEFLECTION = 1e-3
 
 RIPPLE = 4.0
 """Periods of a force that is periodic in the position, over half of the trials' longest way."""
+
+LEAST_PERIODS = 2.0
+"""Fewest of its periods over the longest way: with one, any bump at an end of the way is a wave."""
 
 
 @dataclass(frozen=True)
@@ -83,6 +89,11 @@ class Sizes:
         usual = quantity.from_si(share * size * (self.pressure**pressure if pressure else 1.0))
         least = max(quantity.lower, 0.0)
         return replace(quantity, usual=float(np.clip(usual, least, quantity.upper)))
+
+    def least_periods(self, quantity: Quantity) -> float:
+        """Fewest periods (file unit) that the trials' longest way tells from another law."""
+        fewest = quantity.from_si(LEAST_PERIODS / (2.0 * self.way))
+        return float(np.clip(fewest, quantity.lower, quantity.upper))
 
     def within_way(self, quantity: Quantity) -> Quantity:
         """A length with its usual value, or with a small share of the trials' ways if that is less.

@@ -91,6 +91,19 @@ def test_a_drift_has_as_many_half_waves_as_repeats_tell(turns: float) -> None:
     assert np.sqrt(np.mean(left**2)) < 0.33
 
 
+@pytest.mark.parametrize("phase", [0.4, 1.5, 3.0])
+def test_a_drift_of_one_period_is_none_of_the_rigs_where_commands_are_as_slow(phase: float) -> None:
+    """What it leaves of a wave twice the noise is less than a third of the noise."""
+    at = np.arange(1024) / 1024
+    logged, _ = _logged([np.zeros(1024)])
+    slow = replace(logged[0], motor=np.sin(2.0 * np.pi * at), regulator=np.zeros(1024))
+    noise = replace(white_noise(LEVEL), drift=3.0 * LEVEL)
+    wave = np.sin(2.0 * np.pi * at + phase)
+    left = 2.0 * wave[None] / np.std(wave)
+    projection(noise, slow, CHANNEL, free_zero=True).out_of(left)
+    assert np.sqrt(np.mean(left**2)) < 0.33
+
+
 def _humming(hertz: list[float], seconds: float) -> tuple[list[Logged], list[np.ndarray]]:
     """Trials whose residual is noise and a line as large, of some frequency and phase in each."""
     rng, time = np.random.default_rng(6), np.arange(round(seconds * RATE)) / RATE

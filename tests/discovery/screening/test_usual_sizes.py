@@ -4,6 +4,9 @@ import numpy as np
 import pytest
 
 from pma_gym.data.trial import Trial
+from pma_gym.discovery.fitting.fit_problem import FitProblem
+from pma_gym.discovery.fitting.free_parameters import FreeParameters
+from pma_gym.discovery.preparation.noise import white_noise
 from pma_gym.discovery.screening.candidates import candidate_effects
 from pma_gym.discovery.screening.usual_sizes import sizes
 from pma_gym.plant.model import load_model
@@ -64,3 +67,23 @@ def test_an_imposed_motion_has_the_sizes_of_the_force_that_it_takes(factor):
     assert known.pressure == pytest.approx(2e5)
     per_pressure = Quantity("N/kPa", 0.0, 1e9, "a test", 0.0, usual=1.0)
     assert known.scaled(per_pressure).usual == pytest.approx(0.1 * known.force / 200.0)
+
+
+def test_a_ripple_has_two_periods_in_the_way():
+    """One period in the way is a bump at an end as much as a wave: no fit goes there."""
+    commands = {"contraction_command": 0.02 * SINE}
+    one_period = 3.0 * np.cos(2.0 * np.pi * 50.0 * 0.02 * SINE)
+    trial = Trial(TIME, commands, {"force": one_period})
+    (ripple,) = (
+        each for each in candidate_effects(imposed(), None, [trial]) if each.name == "cogging"
+    )
+    at = ripple.paths.index("cogging.periods_per_m")
+    assert ripple.probes[:, at].min() == pytest.approx(100.0, rel=0.01)
+    assert len(np.unique(ripple.probes, axis=0)) == len(ripple.probes) == len(ripple.signs)
+    assert ripple.grown(0, 1e-3)[at] == ripple.bounds[0][at]
+    noise = (white_noise(1e-3), white_noise(0.01), white_noise(1.0))
+    problem = FitProblem([trial], imposed(), FreeParameters((), np.empty(0)), noise)
+    found = problem.fit(imposed(), (ripple,), {"cogging": ripple.probes[0]})
+    assert found is not None
+    assert found.estimate("cogging.periods_per_m")[0] >= 99.0
+    assert problem.left(found) > 10.0
