@@ -95,6 +95,10 @@ def with_unit(number: str, unit: str) -> str:
     return number if unit == "1" else f"{number} {unit}"
 
 
+TURN_DEG = 360.0
+"""A whole turn (deg)."""
+
+
 @dataclass(frozen=True)
 class Quantity:
     """Unit, bounds, neutral value, usual value and source of one physical parameter.
@@ -126,6 +130,11 @@ class Quantity:
             raise ValueError(f"bounds {bounds} are reversed")
         if self.usual is not None:
             self.check("usual", self.usual)
+
+    @property
+    def turns(self) -> bool:
+        """Whether it is an angle that a whole turn does not change: bounds of a turn either way."""
+        return self.unit == "deg" and (self.lower, self.upper) == (-TURN_DEG, TURN_DEG)
 
     @property
     def factor(self) -> float:

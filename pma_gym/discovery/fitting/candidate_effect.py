@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from pma_gym.effects import CATALOGUE
 from pma_gym.plant.model import Model
-from pma_gym.units import Quantity
+from pma_gym.units import TURN_DEG, Quantity
 
 Array = NDArray[np.float64]
 
@@ -87,6 +87,12 @@ def bounds(paths: Sequence[str]) -> tuple[Array, Array]:
         np.array([quantity.lower for quantity in quantities], float),
         np.array([quantity.upper for quantity in quantities], float),
     )
+
+
+def within_turn(paths: Sequence[str], values: Array) -> Array:
+    """Values in file units, with angles that a whole turn does not change within half a turn."""
+    turning = np.array([_quantity(path).turns for path in paths], bool)
+    return np.where(turning, values - TURN_DEG * np.round(values / TURN_DEG), values)
 
 
 def _quantity(path: str) -> Quantity:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pma_gym.data.trial import Trial
-from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
+from pma_gym.discovery.fitting.candidate_effect import CandidateEffect, within_turn
 from pma_gym.discovery.fitting.free_parameters import FreeParameters, values
 from pma_gym.discovery.preparation.assumed_range import LEAST_GAIN, MOST_DOUBLINGS
 from pma_gym.discovery.preparation.noise import Whitening
@@ -307,11 +307,13 @@ class FitProblem:
             if not further.best.chi_square < search.best.chi_square - LEAST_GAIN:
                 break
             search, converged, reach = further, ended, wider
+        paths = tuple(search.named(search.values))
+        found = within_turn(paths, search.values)
         return Fitted(
-            _at(model, search),
+            model.replace(dict(zip(paths, found.tolist(), strict=True))),
             tuple(candidate.name for candidate in extra),
-            tuple(search.named(search.values)),
-            search.values,
+            paths,
+            found,
             inverse(search.best.curvature),
             search.best.chi_square,
             search.moves,

@@ -50,6 +50,9 @@ PRESLIDINGS = (0.1, 0.4, 1.0, 2.5, 10.0, 40.0)
 """How many times its usual value a presliding distance is looked for at: a seal's is a hundred
 times that of a rolling guide."""
 
+QUARTERS = (0.0, 90.0, 180.0, -90.0)
+"""Where a weight may hang (deg) when the angle is 0: an arm may be level there."""
+
 SLOWER = (0.5, 0.2, 0.08, 0.03)
 """Bandwidths of a sensor that are probed, as a share of what the model says."""
 
@@ -138,7 +141,8 @@ def _lacking(
     except ModelError:
         return None
     own = {f"{effect.name}.{file_keys['repeat']}": list(orders or ())} if counted else {}
-    candidate = _candidate(effect.name, effect, extended, file_keys, shown, own)
+    places = {stem: _places(stem, shown[stem], sizes) for stem in shown}
+    candidate = _candidate(effect.name, effect, extended, file_keys, shown, own, places)
     return candidate if sizes is None else _within_way(candidate, sizes)
 
 
@@ -160,6 +164,13 @@ def _within_way(candidate: CandidateEffect, sizes: Sizes) -> CandidateEffect:
     return replace(candidate, lowest=lowest, probes=probes[order], signs=candidate.signs[kept])
 
 
+def _places(stem: str, quantity: Quantity, sizes: Sizes | None) -> tuple[float, ...]:
+    """Where (file unit) an effect with a place of its own is looked for; none without one."""
+    if stem == "offset" and quantity.turns:
+        return QUARTERS
+    return sizes.rests(quantity) if stem == "rest" and sizes is not None else ()
+
+
 def _sized(effect: Effect, stem: str, quantity: Quantity, sizes: Sizes) -> Quantity:
     """A quantity with the usual value of these trials."""
     if stem in effect.scanned:
@@ -174,6 +185,7 @@ def _candidate(
     file_keys: Mapping[str, str],
     shown: Mapping[str, Quantity],
     own: Mapping[str, Sequence[float]],
+    places: Mapping[str, Sequence[float]] | None = None,
 ) -> CandidateEffect:
     stems = list(shown)
     amplitudes = [stem for stem in stems if shown[stem].neutral is not None]
@@ -182,7 +194,7 @@ def _candidate(
     absent = np.array([_neutral_or_usual(shown[stem]) for stem in stems])
     probes, signs = [], []
     for size in _sizes(amplitudes, switches, shown):
-        for shape in _shapes(shapes, bool(switches), shown):
+        for shape in _shapes(shapes, bool(switches), shown, places or {}):
             row = dict(zip(stems, absent, strict=True))
             row.update(size)
             row.update(shape)
@@ -210,13 +222,20 @@ def _candidate(
 
 
 def _shapes(
-    shapes: Sequence[str], timed: bool, shown: Mapping[str, Quantity]
+    shapes: Sequence[str],
+    timed: bool,
+    shown: Mapping[str, Quantity],
+    places: Mapping[str, Sequence[float]],
 ) -> Iterator[dict[str, float]]:
     """Shapes at which an effect is looked for: the first in some steps, the others as usual."""
     usual = {stem: _usual(shown[stem]) for stem in shapes}
     if "phase" in shapes:
         for periods, phase in product(PERIODS, (0.0, 90.0)):
             yield usual | {"periods": usual["periods"] * periods / 8.0, "phase": phase}
+        return
+    placed = next((stem for stem in shapes if places.get(stem)), None)
+    if placed is not None:
+        yield from (usual | {placed: place} for place in places[placed])
         return
     steps = PRESLIDINGS if "presliding" in shapes else DELAYS if timed else SHAPES
     for factor in steps if shapes else (1.0,):

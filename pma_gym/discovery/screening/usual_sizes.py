@@ -55,11 +55,15 @@ DIMENSIONS: dict[str, tuple[int, int, int, int]] = {
 DEFLECTION = 1e-3
 """Most of what a contact deflects before it slips, over the way of the trials: an assumption."""
 
+RESTS = (0.0, 1.0, -1.0, 4.0, -4.0)
+"""Where a spring may be relaxed, over half of the trials' longest way."""
+
 RIPPLE = 4.0
 """Periods of a force that is periodic in the position, over half of the trials' longest way."""
 
-LEAST_PERIODS = 2.0
-"""Fewest of its periods over the longest way: with one, any bump at an end of the way is a wave."""
+LEAST_PERIODS = 1.25
+"""Fewest of its periods over the longest way: of a wave that is never seen to repeat a bump at an
+end of the way is a part, too."""
 
 
 @dataclass(frozen=True)
@@ -94,6 +98,11 @@ class Sizes:
         """Fewest periods (file unit) that the trials' longest way tells from another law."""
         fewest = quantity.from_si(LEAST_PERIODS / (2.0 * self.way))
         return float(np.clip(fewest, quantity.lower, quantity.upper))
+
+    def rests(self, quantity: Quantity) -> tuple[float, ...]:
+        """Where (file unit) a spring may be relaxed: within the trials' way, and away from it."""
+        way = quantity.from_si(self.way)
+        return tuple(float(np.clip(each * way, quantity.lower, quantity.upper)) for each in RESTS)
 
     def within_way(self, quantity: Quantity) -> Quantity:
         """A length with its usual value, or with a small share of the trials' ways if that is less.

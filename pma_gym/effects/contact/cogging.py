@@ -13,7 +13,7 @@ class Cogging(NamedTuple):
 
     amplitude: Annotated[float, Quantity("N", 0, 1e6, "assumption: 1", 0.0, usual=1)]
     periods: Annotated[float, Quantity("1/m", 0.1, 2e4, "assumption: 100, one in 10 mm", usual=100)]
-    phase: Annotated[float, Quantity("deg", -180, 180, "where the position's zero is", usual=0)]
+    phase: Annotated[float, Quantity("deg", -360, 360, "where the position's zero is", usual=0)]
 
 
 def cogging_force(contraction, p):

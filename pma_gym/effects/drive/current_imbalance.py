@@ -18,7 +18,7 @@ class CurrentImbalance(NamedTuple):
         Quantity("1", 2, 12, f"{_I3}: 5.9, so 6, twice a turn of three pole pairs", usual=6),
     ]
     phase: Annotated[
-        float, Quantity("deg", -180, 180, "where the motor happens to be mounted: 0", usual=0)
+        float, Quantity("deg", -360, 360, "where the motor happens to be mounted: 0", usual=0)
     ]
 
 

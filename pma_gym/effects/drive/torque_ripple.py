@@ -18,7 +18,7 @@ class TorqueRipple(NamedTuple):
         float, Quantity("1", 4, 60, "assumption: 24 a turn, slots or commutator bars", usual=24)
     ]
     phase: Annotated[
-        float, Quantity("deg", -180, 180, "where the motor happens to stand: 0", usual=0)
+        float, Quantity("deg", -360, 360, "where the motor happens to stand: 0", usual=0)
     ]
 
 

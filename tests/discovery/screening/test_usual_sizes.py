@@ -69,21 +69,59 @@ def test_an_imposed_motion_has_the_sizes_of_the_force_that_it_takes(factor):
     assert known.scaled(per_pressure).usual == pytest.approx(0.1 * known.force / 200.0)
 
 
-def test_a_ripple_has_two_periods_in_the_way():
-    """One period in the way is a bump at an end as much as a wave: no fit goes there."""
+def test_a_ripple_is_seen_to_repeat_in_the_way():
+    """Half a period in the way is a bump at an end as much as a wave: no fit goes there."""
     commands = {"contraction_command": 0.02 * SINE}
-    one_period = 3.0 * np.cos(2.0 * np.pi * 50.0 * 0.02 * SINE)
-    trial = Trial(TIME, commands, {"force": one_period})
+    half_period = 3.0 * np.cos(2.0 * np.pi * 25.0 * 0.02 * SINE)
+    trial = Trial(TIME, commands, {"force": half_period})
     (ripple,) = (
         each for each in candidate_effects(imposed(), None, [trial]) if each.name == "cogging"
     )
     at = ripple.paths.index("cogging.periods_per_m")
-    assert ripple.probes[:, at].min() == pytest.approx(100.0, rel=0.01)
+    assert ripple.probes[:, at].min() == pytest.approx(62.5, rel=0.01)
     assert len(np.unique(ripple.probes, axis=0)) == len(ripple.probes) == len(ripple.signs)
     assert ripple.grown(0, 1e-3)[at] == ripple.bounds[0][at]
     noise = (white_noise(1e-3), white_noise(0.01), white_noise(1.0))
     problem = FitProblem([trial], imposed(), FreeParameters((), np.empty(0)), noise)
     found = problem.fit(imposed(), (ripple,), {"cogging": ripple.probes[0]})
     assert found is not None
-    assert found.estimate("cogging.periods_per_m")[0] >= 99.0
+    assert found.estimate("cogging.periods_per_m")[0] >= 62.0
     assert problem.left(found) > 10.0
+
+
+def test_a_weight_is_looked_for_wherever_its_arm_hangs():
+    """With the arm level at angle 0 a weight is a constant torque, which no probe at 0 shows."""
+    (weight,) = (
+        each
+        for each in candidate_effects(joint(), None, [swung(0.5, 0.3)])
+        if each.name == "joint_weight"
+    )
+    at = weight.paths.index("joint_weight.offset_deg")
+    assert set(weight.probes[:, at]) == {-90.0, 0.0, 90.0, 180.0}
+
+
+def test_a_spring_is_looked_for_relaxed_within_the_way_and_away_from_it():
+    commands = {"contraction_command": 0.02 * SINE}
+    trial = Trial(TIME, commands, {"force": 3.0 * SINE})
+    (spring,) = (
+        each for each in candidate_effects(imposed(), None, [trial]) if each.name == "spring"
+    )
+    rests = np.unique(spring.probes[:, spring.paths.index("spring.rest_mm")])
+    np.testing.assert_allclose(rests, [-40.0, -10.0, 0.0, 10.0, 40.0], rtol=0.01)
+
+
+@pytest.mark.parametrize(("start", "phase"), [(170.0, -130.0), (-170.0, 150.0), (90.0, 20.0)])
+def test_a_ripple_is_found_at_any_phase(start, phase):
+    """Phases go round: a search from one side of half a turn ends on the other."""
+    commands = {"contraction_command": 0.02 * SINE}
+    wave = 3.0 * np.cos(2.0 * np.pi * 120.0 * 0.02 * SINE + np.radians(phase))
+    trial = Trial(TIME, commands, {"force": wave})
+    (ripple,) = (
+        each for each in candidate_effects(imposed(), None, [trial]) if each.name == "cogging"
+    )
+    noise = (white_noise(1e-3), white_noise(0.01), white_noise(1.0))
+    problem = FitProblem([trial], imposed(), FreeParameters((), np.empty(0)), noise)
+    begun = np.array([2.0, 118.0, start])
+    found = problem.fit(imposed(), (ripple,), {"cogging": begun})
+    assert found is not None
+    assert found.estimate("cogging.phase_deg")[0] == pytest.approx(phase, abs=1.0)
