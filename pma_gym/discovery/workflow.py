@@ -11,6 +11,7 @@ from pma_gym.data.trial import Trial
 from pma_gym.data.trial_columns import TrialError
 from pma_gym.discovery.answer.diagnosis_from_findings import diagnosis_from_findings
 from pma_gym.discovery.diagnosis import Diagnosis
+from pma_gym.discovery.fitting.fast_motion import with_fast_motion
 from pma_gym.discovery.fitting.fit_problem import FitProblem, Fitted
 from pma_gym.discovery.fitting.free_parameters import free_parameters
 from pma_gym.discovery.fitting.held_out import held_out_misfit
@@ -150,7 +151,11 @@ class _Work:
             tuple(each.file or each.name for each in named),
         )
         self._tell("refitting parameters", 0, 1)
-        refitted = self._timed("parameters", lambda: self._refitted(problem, journal))
+        refitted = self._timed("parameters", lambda: self._refitted(problem))
+        problem, refitted, faster = with_fast_motion(problem, refitted)
+        if faster:
+            given, words = problem.given, (*words, faster)
+            logged = [Logged.of(given, i, trial) for i, trial in enumerate(trials)]
         problem, refitted = self._with_lines(problem, refitted, logged, named)
         orders = [each.order for each in named]
         known = None if None in orders else [float(order or 0.0) for order in orders]
@@ -206,7 +211,7 @@ class _Work:
             asked = check_dataset(asked, model, self.checks)
         return asked, model
 
-    def _refitted(self, problem: FitProblem, journal: Journal) -> Fitted:
+    def _refitted(self, problem: FitProblem) -> Fitted:
         refit = problem.careful_fit(problem.given)
         if refit is None:
             raise ModelError(

@@ -66,6 +66,8 @@ class Effect:
         ties: simpler special cases of the law, each a row of parameters (field names): where the
             first equals the second, the others have no effect. The first is never the smaller one.
             A diagnosis prefers the simpler law unless the data reject it.
+        terms: terms that the law may lack, each a row of parameters (field names): where the first
+            is at its neutral value, the others have no effect. A diagnosis prefers the law without.
         replaces: the part of a model that the effect is one of several forms of: a force law, a
             damping, a person, or a law of free shape. Such an effect replaces another one and is
             not added to it, so a diagnosis never proposes it as missing; compare whole models
@@ -89,6 +91,7 @@ class Effect:
     held: tuple[str, ...] = ()
     scanned: tuple[str, ...] = ()
     ties: tuple[tuple[str, ...], ...] = ()
+    terms: tuple[tuple[str, ...], ...] = ()
     replaces: str = ""
 
     @cached_property

@@ -84,3 +84,29 @@ def test_backlash_that_nothing_could_show_is_no_reason_to_decide_nothing():
     assert "backlash" in {each.name for each in diagnosis.candidates}
     assert "backlash" not in diagnosis.not_detectable
     assert diagnosis.verdict != "effect"
+
+
+@pytest.mark.campaign
+def test_friction_that_rises_near_rest_is_one_effect_with_its_stribeck_speed():
+    hidden = {
+        "contact_friction": {
+            "force_n": 10.0,
+            "presliding_um": 100.0,
+            "rise_n": 4.0,
+            "stribeck_speed_mm_per_s": 8.0,
+        }
+    }
+    diagnosis = diagnose(trials((100e3, 300e3), (0.02, 0.02), **hidden), KNOWN, propose=False)
+    sizes = sizes_of(diagnosis)
+    assert {name.partition(".")[0] for name in sizes} == set(hidden), diagnosis.sentence
+    assert sizes["contact_friction.force_n"] == pytest.approx(10.0, rel=0.05)
+    assert sizes["contact_friction.rise_n"] == pytest.approx(4.0, rel=0.15)
+
+
+@pytest.mark.campaign
+def test_friction_of_one_level_keeps_one_number():
+    hidden = {"contact_friction": {"force_n": 10.0, "presliding_um": 100.0}}
+    diagnosis = diagnose(trials((100e3, 300e3), (0.02, 0.02), **hidden), KNOWN, propose=False)
+    (effect,) = diagnosis.effects
+    assert set(effect.parameters) == {"force_n", "presliding_um"}
+    assert set(effect.undetermined) == {"rise_n", "stribeck_speed_mm_per_s"}

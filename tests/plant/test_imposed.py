@@ -168,3 +168,17 @@ def test_a_fit_gives_back_what_a_seal_does():
     assert values["contact_friction.force_n"] == pytest.approx(10.0, rel=0.01)
     assert values["contractile_force.slope_n_per_kpa"] == pytest.approx(0.49, rel=0.005)
     assert values["contractile_force.intercept_n"] == pytest.approx(3.0, abs=0.2)
+
+
+def test_friction_rises_near_rest():
+    """By `rise` at rest, by half of that at the Stribeck speed, by nothing far above it."""
+    falling = {**FRICTION, "rise_n": 4.0, "stribeck_speed_mm_per_s": 5.0}
+    time = np.arange(0.0, 4.0, 0.004)
+    speeds = {0.005: 12.0, 0.5: 10.0 + 4.0 / 10001.0}
+    for speed, level in speeds.items():
+        steady = Trial(time, {"contraction_command": speed * time})
+        got = Plant(imposed(contact_friction=falling)).simulate(steady, noise=False)
+        assert -got.measurements["force"][500] == pytest.approx(level, rel=1e-3)
+    without = force(imposed(contact_friction=FRICTION), 0.02)
+    none = force(imposed(contact_friction={**FRICTION, "rise_n": 0.0}), 0.02)
+    np.testing.assert_array_equal(none, without)

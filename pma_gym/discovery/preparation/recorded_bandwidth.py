@@ -10,6 +10,9 @@ from pma_gym.plant.model import Model
 RECORDED = 0.4
 """Bandwidth of a motion over the rows in a second that record it, at most: half would be none."""
 
+BANDWIDTH = "imposed_motion.bandwidth_hz"
+"""Path of an imposed motion's bandwidth."""
+
 
 def with_recorded_bandwidth(model: Model, trials: Sequence[Trial]) -> tuple[Model, tuple[str, ...]]:
     """A model whose motion is no faster than the rows of its trials, and words where that changes.
@@ -20,13 +23,17 @@ def with_recorded_bandwidth(model: Model, trials: Sequence[Trial]) -> tuple[Mode
     """
     if not model.rig.imposes_motion:
         return model, ()
-    stated = model.parameters["imposed_motion"].bandwidth
-    rates = [1.0 / float(np.median(np.diff(each.time))) for each in trials if len(each.time) > 1]
-    recorded = RECORDED * min(rates, default=np.inf)
+    stated, recorded = model.parameters["imposed_motion"].bandwidth, recorded_bandwidth(trials)
     if stated <= recorded:
         return model, ()
     words = (
         f"imposed_motion.bandwidth_hz is taken as {recorded:.3g} Hz, not {stated:.4g} Hz: averaged "
         "rows record no faster motion"
     )
-    return model.replace({"imposed_motion.bandwidth_hz": recorded}), (words,)
+    return model.replace({BANDWIDTH: recorded}), (words,)
+
+
+def recorded_bandwidth(trials: Sequence[Trial]) -> float:
+    """Bandwidth (Hz) of the fastest motion that the rows of all trials record."""
+    rates = [1.0 / float(np.median(np.diff(each.time))) for each in trials if len(each.time) > 1]
+    return RECORDED * min(rates, default=np.inf)

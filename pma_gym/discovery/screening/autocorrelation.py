@@ -28,6 +28,9 @@ SLOWEST_HZ, WIDTH, MOSTLY = 0.4, 0.25, 0.7
 """A tone's least frequency (Hz), for slower than that every trial is one swing; half its width as a
 share of it; the least share of the autocorrelation that makes a tone."""
 
+LEAST_PERIODS = 2.0
+"""Fewest periods of a tone in the longest part: what a piece of a second leaves may swing once."""
+
 
 @dataclass(frozen=True)
 class AutocorrelationTest:
@@ -107,7 +110,8 @@ def tone(parts: Sequence[Array], rate_hz: float) -> Tone | None:
         power += np.abs(np.fft.rfft(np.where(np.isfinite(part), part, 0.0), size)) ** 2
     power *= 2.0 / size / count
     hertz = np.arange(len(power)) * rate_hz / size
-    peak = int(np.argmax(np.where(hertz < SLOWEST_HZ, 0.0, power)))
+    slowest = max(SLOWEST_HZ, LEAST_PERIODS * rate_hz / size)
+    peak = int(np.argmax(np.where(hertz < slowest, 0.0, power)))
     away = np.abs(hertz - hertz[peak])
     near = away < WIDTH * hertz[peak]
     # Noise with a memory is not of one level; about the peak it nearly is.

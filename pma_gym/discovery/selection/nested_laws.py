@@ -4,7 +4,8 @@ The profile of a parameter is chi-square with the parameter held and all others 
 stays within `FLAT` of its least up to a limit of the law (a Stribeck speed far above all speeds),
 the parameter is not determined: it is held at that limit, the fit is repeated without it, and no
 value is given for it, only the bound that the profile has on the other side. An effect may also
-say that a simpler law of its own sets one parameter equal to another (`Effect.ties`); the whole law
+say that a simpler law of its own sets one parameter equal to another (`Effect.ties`) or lacks a
+term (`Effect.terms`); the whole law
 stays where it explains more than its further parameters cost, of readings left out too, and where
 the parameter that may be equal is neither below the other nor at an end of its range: a static
 friction of 0 N, or below the dynamic one, borrows the law's form for something else.
@@ -21,7 +22,7 @@ from pma_gym.discovery.fitting.held_out import held_out_misfit
 from pma_gym.discovery.result.estimates import Undetermined
 from pma_gym.discovery.selection.candidate_fits import cost
 from pma_gym.discovery.selection.profile_limits import limits
-from pma_gym.discovery.selection.tied_laws import Chosen, Nested, fit_held, fit_tied, ties
+from pma_gym.discovery.selection.tied_laws import Chosen, Nested, fit_held, fit_tied, simpler_laws
 
 FLAT = 4.0
 """Chi-square by which a profile may rise and still be flat: twice a log-likelihood of 2."""
@@ -117,12 +118,12 @@ def _all_tied(problem: FitProblem, state: Nested) -> Nested:
 def _tied(problem: FitProblem, state: Nested, place: int) -> Nested | None:
     """With the simpler law of an effect; None where it has none, or the trials refuse it."""
     candidate = state.chosen[place]
-    for tie in ties(candidate):
+    for tie in simpler_laws(candidate):
         simpler = fit_tied(problem, state, place, tie)
         # What the whole law explains more must be worth its parameters, as anywhere.
         if simpler is not None and (
             cost(simpler.fit) < cost(state.fit)
-            or state.fit.estimate(tie.path)[0] < state.fit.estimate(tie.twin)[0]
+            or (tie.twin and state.fit.estimate(tie.path)[0] < state.fit.estimate(tie.twin)[0])
             or _ended(problem, state, tie.path)
             or not _asked_for(problem, state, simpler)
         ):
@@ -142,7 +143,11 @@ def _ended(problem: FitProblem, state: Nested, path: str) -> bool:
             strict=True,
         )
     )
-    return bool(at_limit(state.fit.estimate(path)[0], *ranges[path]))
+    value, error = state.fit.estimate(path)
+    lower, upper = ranges[path]
+    # A range may be a million times as wide as the value: what is surely off its end is not there.
+    surely = lower + UNSURE * error < value < upper - UNSURE * error
+    return bool(at_limit(value, lower, upper)) and not surely
 
 
 def _asked_for(problem: FitProblem, whole: Nested, simpler: Nested) -> bool:

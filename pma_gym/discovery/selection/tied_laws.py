@@ -44,8 +44,8 @@ class Tie:
     """Parameters by which a law becomes simpler.
 
     Attributes:
-        path: the one that equals another in the simpler law.
-        twin: the other.
+        path: the one that equals another in the simpler law, or that a term has as its size.
+        twin: the other; empty where the simpler law is without the term.
         idle: those that do nothing there.
     """
 
@@ -54,14 +54,28 @@ class Tie:
     idle: tuple[str, ...]
 
 
-def ties(candidate: CandidateEffect) -> Iterator[Tie]:
+def simpler_laws(candidate: CandidateEffect) -> Iterator[Tie]:
     """The simpler laws of an effect whose parameters are fitted."""
-    file_keys = CATALOGUE[candidate.effect].names_in_files()
-    stems = {file_keys[path.partition(".")[2]]: path for path in candidate.fitted_paths}
+    yield from ties(candidate)
+    stems = _fitted(candidate)
+    for size, *idle in CATALOGUE[candidate.effect].terms:
+        if size in stems:
+            yield Tie(stems[size], "", tuple(stems[stem] for stem in idle if stem in stems))
+
+
+def ties(candidate: CandidateEffect) -> Iterator[Tie]:
+    """Those of them in which two parameters are equal."""
+    stems = _fitted(candidate)
     for one, other, *idle in CATALOGUE[candidate.effect].ties:
         if one in stems and other in stems:
             rest = tuple(stems[stem] for stem in idle if stem in stems)
             yield Tie(stems[one], stems[other], rest)
+
+
+def _fitted(candidate: CandidateEffect) -> dict[str, str]:
+    """Paths of an effect's fitted parameters by field name."""
+    file_keys = CATALOGUE[candidate.effect].names_in_files()
+    return {file_keys[path.partition(".")[2]]: path for path in candidate.fitted_paths}
 
 
 def fit_held(
@@ -88,8 +102,15 @@ def idle_values(candidate: CandidateEffect, tie: Tie, share: float) -> dict[str,
 
 
 def fit_tied(problem: FitProblem, state: Nested, place: int, tie: Tie) -> Nested | None:
-    """The best fit in which the first of two parameters equals the other, and some do nothing."""
+    """The best fit of the simpler law, in which some parameters do nothing.
+
+    The first of two parameters equals the other, or a term's size is at its neutral value.
+    """
     path, twin = tie.path, tie.twin
+    if not twin:
+        absent = dict(zip(state.chosen[place].paths, state.chosen[place].absent, strict=True))
+        held = {path: float(absent[path])} | idle_values(state.chosen[place], tie, 1.0)
+        return fit_held(problem, state, place, held)
     idle = idle_values(state.chosen[place], tie, IDLE_SHARE)
     best: Nested | None = None
     for size in (state.fit.estimate(twin)[0], state.fit.estimate(path)[0]):

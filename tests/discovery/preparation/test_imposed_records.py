@@ -5,7 +5,11 @@ import pytest
 
 from pma_gym.data.datasets.dataset import NamedTrial
 from pma_gym.data.trial import Trial
+from pma_gym.discovery.fitting.fast_motion import with_fast_motion
+from pma_gym.discovery.fitting.fit_problem import FitProblem
+from pma_gym.discovery.fitting.free_parameters import free_parameters
 from pma_gym.discovery.preparation.data_checks.lead_in import with_lead_in
+from pma_gym.discovery.preparation.noise import white_noise
 from pma_gym.discovery.preparation.prepared_trials import prepared
 from pma_gym.discovery.preparation.recorded_bandwidth import with_recorded_bandwidth
 from pma_gym.discovery.screening.candidates import candidate_effects
@@ -70,6 +74,29 @@ def test_averaged_rows_record_a_motion_of_less_bandwidth():
     assert f"{0.4 * rate:.3g} Hz, not 40 Hz" in words[0]
     same, nothing = with_recorded_bandwidth(imposed(), [named(TIME, 0.02 * SINE).trial])
     assert same == imposed() and not nothing
+
+
+@pytest.mark.parametrize(
+    ("record_noise", "bandwidth", "taken"), [(1e-7, 2.0, 8.0), (1e-7, 30.0, 30.0), (1e-3, 5.0, 5.0)]
+)
+def test_a_motion_is_as_fast_as_its_record_beyond_the_noise(record_noise, bandwidth, taken):
+    """Strokes with short rounded ends: 2 Hz cut them, and what the dampers make of them."""
+    rng = np.random.default_rng(1)
+    strokes = 0.02 * np.sin(0.5 * np.pi * np.sin(2.0 * np.pi * 0.5 * TIME) ** 3)
+    rig = imposed(symmetric_damping={"intercept_n_s_per_mm": 1.0, "slope_n_s_per_mm_per_kpa": 0.0})
+    rig = rig.replace({"imposed_motion.bandwidth_hz": bandwidth})
+    force = -1e3 * np.gradient(strokes, TIME) + rng.normal(0.0, 0.1, len(TIME))
+    record = strokes + rng.normal(0.0, record_noise, len(TIME))
+    trial = Trial(TIME, {"contraction_command": record}, {"force": force})
+    noise = (white_noise(1e-3), white_noise(0.1), white_noise(1.0))
+    problem = FitProblem([trial], rig, free_parameters(rig), noise)
+    refitted = problem.careful_fit(rig)
+    assert refitted is not None
+    faster, better, words = with_fast_motion(problem, refitted)
+    got = faster.given.parameters["imposed_motion"].bandwidth
+    assert got >= taken if taken > bandwidth else got == taken
+    assert bool(words) == (taken > bandwidth)
+    assert better.chi_square <= 1.01 * refitted.chi_square
 
 
 def test_without_a_pressure_nothing_is_looked_for_that_pressure_makes():

@@ -68,3 +68,18 @@ def test_noise_and_a_slow_drift_have_no_tone():
     time = np.arange(ROWS) / RATE
     assert all(tone(noise(seed, 0.5), RATE) is None for seed in range(20))
     assert tone([part + np.exp(-time / 2.0) for part in noise(1)], RATE) is None
+
+
+def test_one_swing_in_each_piece_is_no_tone():
+    """Pieces of a second that each begin anew leave a swing a second, whatever is missing."""
+    rng, rate = np.random.default_rng(3), 100.0
+    time = np.arange(100) / rate
+    parts = [
+        np.sin(2.0 * np.pi * time + rng.uniform(0.0, 6.0)) + 0.1 * rng.standard_normal(100)
+        for _ in range(40)
+    ]
+    assert autocorrelation_test(parts, rate).sure
+    assert tone(parts, rate) is None
+    longer = [np.concatenate([part, part, part]) for part in parts]
+    found = tone(longer, rate)
+    assert found is not None and found.hertz == pytest.approx(1.0, abs=0.2)

@@ -16,6 +16,10 @@ STEP = 1e-6
 CREEP = 1e-3
 """Speed at which a machine that dwells still goes on as it came, over the largest."""
 
+TURNS = 1e-5
+"""Way back after which friction has turned round, over half of the stroke: contacts deflect, and no
+record of a machine tells less."""
+
 
 def simulate(
     rig: ImposedRig, effects: tuple[HiddenEffect, ...], motion: Reference, pressure: float
@@ -33,18 +37,19 @@ def simulate(
         rig.rate,
     )
     world = World(mujoco(), slide, effects, STEP)
-    creeping = _creeping(motion.v, CREEP * rig.peak_speed)
+    creeping = _creeping(motion, CREEP * rig.peak_speed, TURNS * rig.travel)
     rows = zip(motion.q.tolist(), creeping.tolist(), motion.a.tolist(), strict=True)
     forces = np.array([world.inverse(q, v, a, pressure) for q, v, a in rows])
     return forces - rig.damping * (creeping - motion.v) + rig.area * pressure
 
 
-def _creeping(speeds: Array, creep: float) -> Array:
+def _creeping(motion: Reference, creep: float, back: float) -> Array:
     """Speeds of which none but those before the first move is 0: friction keeps its direction."""
-    used, last = speeds.copy(), 0.0
-    for i, speed in enumerate(speeds.tolist()):
-        if abs(speed) > creep:
-            last = 1.0 if speed > 0.0 else -1.0
-        elif last:
+    used, last, farthest = motion.v.copy(), 0.0, float(motion.q[0])
+    for i, (q, speed) in enumerate(zip(motion.q.tolist(), motion.v.tolist(), strict=True)):
+        if abs(q - farthest) > back or last * (q - farthest) > 0.0:
+            last = 1.0 if q > farthest else -1.0
+            farthest = q
+        if abs(speed) < creep or last * speed < 0.0:
             used[i] = creep * last
     return used

@@ -3,7 +3,8 @@
 What a diagnosis costs grows with its rows. Readings are averaged over blocks of rows: nothing
 faster folds into what is left, and their noise falls. The average is a parabola's value at the
 block's middle (Savitzky and Golay), since a plain mean cuts the corners of a course, which a fit
-takes for physics. Commands keep every row that joining the others would miss.
+takes for physics. A block whose readings jump has no such value, and none is given: friction that
+turns round is a step. Commands keep every row that joining the others would miss.
 """
 
 import math
@@ -38,6 +39,10 @@ WORTH = 0.5
 """Most rows that trials of one rate may keep, as a share of their own: a command that changes in
 every row, as a noisy controller's does, needs them all, and averages of readings would only hide
 the fastest. Trials of one rate are averaged all or none, for they share one noise."""
+
+JUMP, RARE = 4.0, 0.05
+"""Noises off its parabola from which on a block jumps, and the share of blocks that may: where more
+are, readings are as fast as that all the time."""
 
 CURVATURE, UNSEEN = 1e-4, 0.25
 """Largest change of a command by leaving rows out, as a share of its span: so much at most, and so
@@ -117,9 +122,25 @@ def _fewer(trial: Trial, factor: int, off: float) -> Trial:
     for name, row in trial.measurements.items():
         measurements[name] = np.full(time.size, np.nan)
         # A block with a gap has no middle of its own: NaN stays.
-        measurements[name][at] = row[inner] @ _weights(factor)
+        measurements[name][at] = _without_jumps(row[inner], level_of_neighbours([row]))
     kept = {"provenance": trial.provenance, "memory_at_start": trial.memory_at_start}
     return Trial(time, commands, measurements, **kept)
+
+
+def _without_jumps(blocks: Array, level: float) -> Array:
+    """Readings at the middle of blocks, shape (blocks,), NaN where a rare one jumps.
+
+    Args:
+        blocks: readings, shape (blocks, rows).
+        level: standard deviation of their noise.
+    """
+    count = blocks.shape[1]
+    middles = blocks @ _weights(count)
+    along = np.linspace(-1.0, 1.0, count)
+    basis = np.linalg.qr(np.stack([along**0, along, along**2], axis=1)[:, : min(3, count - 1)])[0]
+    off = np.sqrt(np.mean((blocks - (blocks @ basis) @ basis.T) ** 2, axis=1))
+    jumps = off > JUMP * level
+    return np.where(jumps & (np.mean(jumps) < RARE), np.nan, middles)
 
 
 def _middles(times: Array) -> Array:

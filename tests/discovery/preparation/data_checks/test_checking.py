@@ -170,6 +170,22 @@ def test_long_logs_are_averaged(tmp_path, monkeypatch):
     assert abs(block.mean() - parabola) > 1e-4
 
 
+def test_a_block_in_which_readings_jump_has_no_average(tmp_path, monkeypatch):
+    """Friction that turns round is a step; a parabola through it is neither side of it."""
+    monkeypatch.setattr("pma_gym.discovery.preparation.data_checks.averaging.MOST_ROWS", 2000)
+    monkeypatch.setattr("pma_gym.discovery.preparation.data_checks.averaging.AIM_ROWS", 1000)
+    columns = log(2.0, 300.0, 1, rate=500.0, seconds=8.0)
+    columns["load_n"] = columns["load_n"] + 80.0 * (np.arange(len(columns["load_n"])) >= 2002)
+    (fewer,) = checked(write(tmp_path / "lab", [columns])).trials
+    row = fewer.trial.measurements["load"]
+    around = (fewer.trial.time > 2002 / 500.0 - 0.06) & (fewer.trial.time < 2002 / 500.0 + 0.06)
+    known = row[around][np.isfinite(row[around])]
+    jump = float(np.diff(known).max())
+    assert jump == pytest.approx(80.0, abs=5.0)
+    # Every other reading is near one side.
+    assert np.sort(np.abs(np.diff(known)))[-2] < 10.0
+
+
 def test_trials_of_one_rate_are_averaged_all_or_none(tmp_path, monkeypatch):
     """They share one noise, and averages have less: one that cannot be averaged keeps all whole."""
     monkeypatch.setattr("pma_gym.discovery.preparation.data_checks.averaging.MOST_ROWS", 2000)
