@@ -39,6 +39,7 @@ from pma_gym.discovery.selection.rivals import rivals
 from pma_gym.discovery.verdict.adequacy import Residual, adequacy
 from pma_gym.discovery.verdict.decision import suspicious
 from pma_gym.discovery.verdict.findings import Findings
+from pma_gym.discovery.verdict.tolerated import is_tolerated, may_be_tolerated, without_effects
 from pma_gym.estimation.logged import Logged
 from pma_gym.plant.model import Model, ModelError, load_model
 
@@ -305,11 +306,20 @@ class _Work:
         """
         judged = self._judged(findings, logged)
         if judged.adequacy.structure is None or findings.elimination is None:
-            return judged
+            return self._tolerated(judged, logged)
         if findings.discarded is not None:
             return judged
         free = self._judged(self._confirmed(replace(findings, elimination=None)), logged)
         return judged if free.adequacy.structure is not None else free
+
+    def _tolerated(self, findings: Findings, logged: Sequence[Logged]) -> Findings:
+        """Without effects, where these carry too little and the lab's tolerances are kept."""
+        if not may_be_tolerated(findings):
+            return findings
+        bare = without_effects(findings)
+        bare = replace(bare, elimination=_backward_elimination(bare))
+        bare = self._judged(self._confirmed(bare), logged)
+        return bare if is_tolerated(bare) else findings
 
     def _timed(self, step: str, work: Callable):  # noqa: ANN202
         begun = time.perf_counter()

@@ -7,6 +7,7 @@ again (generalised least squares). What repeats from trial to trial keeps most o
 what differs between trials like a drift loses it.
 """
 
+import math
 from collections import OrderedDict
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -27,6 +28,9 @@ LEAST_COSINES, MOST_COSINES = 3, 4
 WANDER, MOST_TURNS = 4e-4, 24
 """How far a line's frequency is off in a trial, as a share of it, and how many half turns of that a
 trial gives it at most. An assumption: the frequency of mains changes by 20 mHz."""
+
+STEADY = 0.25
+"""Half turns by which a line's frequency may be off in a trial and leave a fifth of it."""
 
 LEAKS = 2
 """Half turns beyond those that a line's wandering may have."""
@@ -144,7 +148,7 @@ def line_columns(hertz: float, time: Array) -> list[Array]:
         time: of the rows (s), shape (rows,), from the first on.
     """
     duration = max(float(time[-1] - time[0]), 1e-300)
-    turns = min(int(2.0 * WANDER * hertz * duration), MOST_TURNS)
+    turns = min(math.ceil(max(2.0 * WANDER * hertz * duration - STEADY, 0.0)), MOST_TURNS)
     # What is no whole number of half turns leaks into the next ones.
     turns += LEAKS if turns else 0
     slow = [np.cos(np.pi * k * (time - time[0]) / duration) for k in range(turns + 1)]
