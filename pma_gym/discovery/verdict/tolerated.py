@@ -11,12 +11,7 @@ from dataclasses import replace
 from pma_gym.discovery.screening.residuals import reestimated_noise
 from pma_gym.discovery.verdict.findings import Findings
 from pma_gym.discovery.verdict.residual_fraction import residual_fraction
-from pma_gym.discovery.verdict.unknown import (
-    gate,
-    leaves_structure,
-    shapeless_laws,
-    why_unknown,
-)
+from pma_gym.discovery.verdict.unknown import leaves_structure, shapeless_laws, why_unknown
 
 MOST_TOLERANCES = 1.0
 """Largest misfit, in tolerances, that a model without effects may leave."""
@@ -28,7 +23,7 @@ def may_be_tolerated(findings: Findings) -> bool:
     floors = [signal.floor for signal in signals]
     if not floors or any(floor is None or floor.source != "tolerance" for floor in floors):
         return False
-    if not findings.selection.stages or not (gate(findings) or findings.selection.chosen):
+    if not findings.selection.stages:
         return False
     left = residual_fraction(findings)
     unknown = why_unknown(findings, left, shapeless_laws(findings, left))
