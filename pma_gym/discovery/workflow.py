@@ -11,6 +11,7 @@ from pma_gym.data.trial import Trial
 from pma_gym.data.trial_columns import TrialError
 from pma_gym.discovery.answer.diagnosis_from_findings import diagnosis_from_findings
 from pma_gym.discovery.diagnosis import Diagnosis
+from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
 from pma_gym.discovery.fitting.fast_motion import with_fast_motion
 from pma_gym.discovery.fitting.fit_problem import FitProblem, Fitted
 from pma_gym.discovery.fitting.free_parameters import free_parameters
@@ -18,7 +19,7 @@ from pma_gym.discovery.fitting.held_out import held_out_misfit
 from pma_gym.discovery.fitting.journal import Journal
 from pma_gym.discovery.preparation.acceptance_floors import Stated, acceptance_floors
 from pma_gym.discovery.preparation.data_checks import check_dataset
-from pma_gym.discovery.preparation.initial_floors import initial_floors
+from pma_gym.discovery.preparation.initial_floors import Level, initial_floors
 from pma_gym.discovery.preparation.learnt_noise import learnt_noise
 from pma_gym.discovery.preparation.mains_lines import with_lines
 from pma_gym.discovery.preparation.noise import white_noise
@@ -135,22 +136,10 @@ class _Work:
         trials = [each.trial for each in named]
         given, slower = with_recorded_bandwidth(given, trials)
         words = (*(dataset.checked or ()), *words, *slower)
-        journal = Journal(self.folder, trials, given, f"diagnosis 4 seed {self.seed}")
+        journal = Journal(self.folder, trials, given, f"diagnosis 5 seed {self.seed}")
         logged = [Logged.of(given, i, trial) for i, trial in enumerate(trials)]
         floors = self._timed("noise", lambda: initial_floors(given, logged, named, dataset.sensors))
-        own = free_parameters(given)
-        _check_size(logged, own.free)
-        noise = tuple(white_noise(floor.level) for floor in floors)
-        noise = learnt_noise(noise, logged, named)
-        problem = FitProblem(
-            trials,
-            given,
-            own,
-            noise,
-            max(1, self.jobs),
-            any(map(is_coarse, floors)),
-            tuple(each.file or each.name for each in named),
-        )
+        problem = self._problem(given, named, logged, floors)
         self._tell("refitting parameters", 0, 1)
         refitted = self._timed("parameters", lambda: self._refitted(problem))
         problem, refitted, faster = with_fast_motion(problem, refitted)
@@ -158,9 +147,7 @@ class _Work:
             given, words = problem.given, (*words, faster)
             logged = [Logged.of(given, i, trial) for i, trial in enumerate(trials)]
         problem, refitted = self._with_lines(problem, refitted, logged, named)
-        orders = [each.order for each in named]
-        known = None if None in orders else [float(order or 0.0) for order in orders]
-        every = candidate_effects(given, known, trials) if search else []
+        every = _candidates(given, named) if search else []
         selection = self._timed(
             "selection",
             lambda: (
@@ -192,6 +179,27 @@ class _Work:
         )
         warnings = (*words, *diagnosis.warnings)
         return replace(diagnosis, warnings=warnings, seconds=dict(self.seconds))
+
+    def _problem(
+        self,
+        given: Model,
+        named: Sequence[NamedTrial],
+        logged: Sequence[Logged],
+        floors: Sequence[Level],
+    ) -> FitProblem:
+        """What all fits share, with the noise that rest and repeats tell."""
+        own = free_parameters(given)
+        _check_size(logged, own.free)
+        noise = tuple(white_noise(floor.level) for floor in floors)
+        return FitProblem(
+            [each.trial for each in named],
+            given,
+            own,
+            learnt_noise(noise, logged, named),
+            max(1, self.jobs),
+            any(map(is_coarse, floors)),
+            tuple(each.file or each.name for each in named),
+        )
 
     def _input(self) -> tuple[Dataset, Model]:
         asked = self.asked
@@ -330,6 +338,13 @@ class _Work:
     def _tell(self, step: str, done: int, total: int) -> None:
         if self.watcher is not None:
             self.watcher(step, done, total)
+
+
+def _candidates(given: Model, named: Sequence[NamedTrial]) -> list[CandidateEffect]:
+    """The whole catalogue for these trials."""
+    orders = [each.order for each in named]
+    known = None if None in orders else [float(order or 0.0) for order in orders]
+    return candidate_effects(given, known, [each.trial for each in named])
 
 
 def _nothing(problem: FitProblem, refitted: Fitted) -> Selection:

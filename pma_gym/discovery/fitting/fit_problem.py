@@ -308,12 +308,12 @@ class FitProblem:
                 break
             search, converged, reach = further, ended, wider
         paths = tuple(search.named(search.values))
-        found = within_turn(paths, search.values)
+        ended_at = within_turn(paths, search.values)
         return Fitted(
-            model.replace(dict(zip(paths, found.tolist(), strict=True))),
+            model.replace(dict(zip(paths, ended_at.tolist(), strict=True))),
             tuple(candidate.name for candidate in extra),
             paths,
-            found,
+            ended_at,
             inverse(search.best.curvature),
             search.best.chi_square,
             search.moves,

@@ -96,8 +96,8 @@ class Sizes:
 
     def least_periods(self, quantity: Quantity) -> float:
         """Fewest periods (file unit) that the trials' longest way tells from another law."""
-        fewest = quantity.from_si(LEAST_PERIODS / (2.0 * self.way))
-        return float(np.clip(fewest, quantity.lower, quantity.upper))
+        least = quantity.from_si(LEAST_PERIODS / (2.0 * self.way))
+        return float(np.clip(least, quantity.lower, quantity.upper))
 
     def rests(self, quantity: Quantity) -> tuple[float, ...]:
         """Where (file unit) a spring may be relaxed: within the trials' way, and away from it."""

@@ -81,5 +81,5 @@ def test_one_swing_in_each_piece_is_no_tone():
     assert autocorrelation_test(parts, rate).sure
     assert tone(parts, rate) is None
     longer = [np.concatenate([part, part, part]) for part in parts]
-    found = tone(longer, rate)
-    assert found is not None and found.hertz == pytest.approx(1.0, abs=0.2)
+    swing = tone(longer, rate)
+    assert swing is not None and swing.hertz == pytest.approx(1.0, abs=0.2)

@@ -83,10 +83,10 @@ def test_a_ripple_is_seen_to_repeat_in_the_way():
     assert ripple.grown(0, 1e-3)[at] == ripple.bounds[0][at]
     noise = (white_noise(1e-3), white_noise(0.01), white_noise(1.0))
     problem = FitProblem([trial], imposed(), FreeParameters((), np.empty(0)), noise)
-    found = problem.fit(imposed(), (ripple,), {"cogging": ripple.probes[0]})
-    assert found is not None
-    assert found.estimate("cogging.periods_per_m")[0] >= 62.0
-    assert problem.left(found) > 10.0
+    fit = problem.fit(imposed(), (ripple,), {"cogging": ripple.probes[0]})
+    assert fit is not None
+    assert fit.estimate("cogging.periods_per_m")[0] >= 62.0
+    assert problem.left(fit) > 10.0
 
 
 def test_a_weight_is_looked_for_wherever_its_arm_hangs():
@@ -122,6 +122,6 @@ def test_a_ripple_is_found_at_any_phase(start, phase):
     noise = (white_noise(1e-3), white_noise(0.01), white_noise(1.0))
     problem = FitProblem([trial], imposed(), FreeParameters((), np.empty(0)), noise)
     begun = np.array([2.0, 118.0, start])
-    found = problem.fit(imposed(), (ripple,), {"cogging": begun})
-    assert found is not None
-    assert found.estimate("cogging.phase_deg")[0] == pytest.approx(phase, abs=1.0)
+    fit = problem.fit(imposed(), (ripple,), {"cogging": begun})
+    assert fit is not None
+    assert fit.estimate("cogging.phase_deg")[0] == pytest.approx(phase, abs=1.0)
