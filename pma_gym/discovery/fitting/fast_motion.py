@@ -1,24 +1,33 @@
 """An imposed motion is as fast as its record says.
 
 A stated bandwidth may be too low and smooth the corners of a motion away: what damping, stiffness
-and friction make of these then looks like an effect. It is doubled as long as what it takes from
-the record is far more than the record's noise, up to what the rows record.
+and friction make of these then looks like an effect. It is doubled as long as that changes the
+force by more than a share of its noise, or takes from the record more than its noise and than a
+contact deflects by.
 """
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from pma_gym.data.trial import Trial
 from pma_gym.discovery.fitting.fit_problem import FitProblem, Fitted
 from pma_gym.discovery.preparation.noise import level_of_neighbours
 from pma_gym.discovery.preparation.recorded_bandwidth import BANDWIDTH, recorded_bandwidth
 from pma_gym.plant.imposed_motion import smoothed
-from pma_gym.plant.model import Model
 
 MOTION = 3.0
 """Noises of the record from which on what a bandwidth takes from it counts as motion."""
+
+DEFLECTION = 1e-5
+"""Share of the way that a bandwidth may take from it: a contact that turns round deflects by more
+(an assumption)."""
+
+CHANGE = 0.1
+"""Change of the force by a bandwidth twice as large, in standard deviations of its noise, that does
+not count."""
+
+FALLS = 3.0
+"""How many times less a doubled bandwidth must change the force than the one before, at least."""
 
 WORSE = 1.01
 """Chi-square over that at the stated bandwidth from which on a faster motion is refused: the record
@@ -37,10 +46,17 @@ def with_fast_motion(problem: FitProblem, refitted: Fitted) -> tuple[FitProblem,
     if not problem.given.rig.imposes_motion:
         return problem, refitted, ""
     stated = problem.given.parameters["imposed_motion"].bandwidth
-    bandwidth = _bandwidth(problem.given, problem.trials, stated)
+    bandwidth, most, before = stated, recorded_bandwidth(problem.trials), np.inf
+    while bandwidth < most:
+        twice = min(2.0 * bandwidth, most)
+        change = _change_of_force(problem, refitted, bandwidth, twice)
+        # What hardly falls is no motion: noise of the record, or lines between its rows.
+        if not _takes_motion(problem, bandwidth) and (change < CHANGE or change > before / FALLS):
+            break
+        bandwidth, before = twice, change
     if bandwidth == stated:
         return problem, refitted, ""
-    faster = replace(problem, given=problem.given.replace({BANDWIDTH: bandwidth}))
+    faster = _at(problem, bandwidth)
     again = faster.fit(refitted.model.replace({BANDWIDTH: bandwidth}))
     if again is None or again.chi_square > WORSE * refitted.chi_square:
         return problem, refitted, ""
@@ -51,18 +67,35 @@ def with_fast_motion(problem: FitProblem, refitted: Fitted) -> tuple[FitProblem,
     return faster, again, words
 
 
-def _bandwidth(model: Model, trials: Sequence[Trial], stated: float) -> float:
-    """Bandwidth (Hz) that takes no motion from the records; the stated one where that does not."""
-    command = model.rig.direct_commands["imposed_motion"]
-    records = [trial.commands[command] for trial in trials]
-    noise, bandwidth = level_of_neighbours(records), stated
-    most = recorded_bandwidth(trials)
-    while bandwidth < most:
-        taken = [
-            record - smoothed(trial.time, record, bandwidth)[0]
-            for trial, record in zip(trials, records, strict=True)
-        ]
-        if np.sqrt(np.mean(np.concatenate(taken) ** 2)) <= MOTION * noise:
-            break
-        bandwidth = min(2.0 * bandwidth, most)
-    return bandwidth
+def _at(problem: FitProblem, bandwidth: float) -> FitProblem:
+    """The problem with another bandwidth (Hz)."""
+    return replace(problem, given=problem.given.replace({BANDWIDTH: bandwidth}))
+
+
+def _takes_motion(problem: FitProblem, bandwidth: float) -> bool:
+    """Whether a bandwidth (Hz) takes more from the records than noise and a small deflection."""
+    command = problem.given.rig.direct_commands["imposed_motion"]
+    records = [trial.commands[command] for trial in problem.trials]
+    taken = [
+        record - smoothed(trial.time, record, bandwidth)[0]
+        for trial, record in zip(problem.trials, records, strict=True)
+    ]
+    size = float(np.sqrt(np.mean(np.concatenate(taken) ** 2)))
+    way = max(float(np.ptp(record)) for record in records)
+    return size > max(MOTION * level_of_neighbours(records), DEFLECTION * way)
+
+
+def _change_of_force(
+    problem: FitProblem, refitted: Fitted, bandwidth: float, twice: float
+) -> float:
+    """Rms by which the refitted model's force differs between two bandwidths (Hz), in its noise."""
+    forces = []
+    for hertz in (bandwidth, twice):
+        model = refitted.model.replace({BANDWIDTH: hertz})
+        readings = _at(problem, hertz).whitened_residuals(model).readings(refitted.values)
+        if readings is None:
+            return 0.0
+        forces.append(readings)
+    (channel,) = (k for k, each in enumerate(problem.given.rig.signals) if each.is_force)
+    apart = np.concatenate([b[channel] - a[channel] for a, b in zip(*forces, strict=True)])
+    return float(np.sqrt(np.mean(apart**2)) / problem.noise[channel].level)
