@@ -153,7 +153,13 @@ def _decision(findings: Findings, left: ResidualFraction) -> _Decision:
     chosen = tuple(candidate.name for candidate in findings.selection.chosen)
     is_right = unknown is None and findings.adequacy.structure is None
     closes = None if is_right or not chosen else closing(gaps(records), chosen)
-    if closes is not None and closes.named and widest_scatter(findings) <= MOST_SCATTER:
+    final = unknown is not None and unknown.final
+    if (
+        closes is not None
+        and closes.named
+        and not final
+        and widest_scatter(findings) <= MOST_SCATTER
+    ):
         # An approximate law is a name where a right one would be; else the verdict stays.
         named = verdict_of(findings, None, not_detectable, bool(coarse), off)
         verdict = named if named == "effect" else verdict

@@ -15,6 +15,8 @@ from pma_gym.discovery.verdict.findings import Findings
 from pma_gym.discovery.verdict.homogeneity_test import homogeneity_test
 from pma_gym.discovery.verdict.residual_fraction import ResidualFraction
 from pma_gym.discovery.verdict.residual_laws import EstimatedLaw, estimated_laws
+from pma_gym.effects import CATALOGUE
+from pma_gym.effects.effect import signals
 
 MOST_LEFT = 0.35
 """Share of what was slow in the residual that may be left by effects that explain it."""
@@ -39,6 +41,12 @@ EXTRAPOLATED = 1.0
 """Scatter from which on it is extrapolated: sizes of groups come from slopes, which hold for small
 changes. Sizes that really scattered by more than themselves would leave a residual; where none is
 left, the slopes are wrong, not the law."""
+
+MOST_OF_SHAPES = 1.25
+"""Noises that several laws of the position alone may leave."""
+
+PLACES = ({"position"}, {"angle"}, {"contraction"})
+"""What a law of the position alone takes."""
 
 Why = Literal["unexplained", "misfit", "explained", "slow", "autocorrelated", "scatters", "outdone"]
 """`unexplained`: the residual is no noise, and no effect was added. `misfit`: nor is it, it exceeds
@@ -66,6 +74,7 @@ class Reason:
             (`scatters`), or name of the law (`outdone`).
         by: what the size scatters with: `trial` or an output.
         gain: fall of chi-square by the effects (`outdone`).
+        final: whether the effects are not even named as approximate laws.
     """
 
     why: Why
@@ -77,6 +86,7 @@ class Reason:
     of: str = ""
     by: str = ""
     gain: float = 0.0
+    final: bool = False
 
 
 def why_unknown(
@@ -115,6 +125,9 @@ def leaves_structure(findings: Findings, left: ResidualFraction) -> Reason | Non
     problem, chosen = findings.problem, findings.selection.chosen
     if not chosen:
         return None
+    drawn = _drawn_by_shapes(findings)
+    if drawn is not None:
+        return replace(drawn, effects=tuple(each.name for each in chosen), leaves=left.slow)
     before = problem.sum_of_squares(findings.refitted.model) - problem.count
     after = problem.sum_of_squares(findings.selection.fit.model, chosen) - problem.count
     if after <= MOST_APPROXIMATE * before:
@@ -122,6 +135,22 @@ def leaves_structure(findings: Findings, left: ResidualFraction) -> Reason | Non
     reason = _inadequate(findings) or _far_off(findings)
     names = tuple(candidate.name for candidate in chosen)
     return None if reason is None else replace(reason, effects=names, leaves=left.slow)
+
+
+def _drawn_by_shapes(findings: Findings) -> Reason | None:
+    """Two laws of the position alone, such as a spring and a weight, that leave more than noise.
+
+    Their difference draws any bent curve about as well; where both are there they leave noise.
+    """
+    chosen = findings.selection.chosen
+    laws = [CATALOGUE[each.effect].law for each in chosen]
+    if sum(law is not None and set(signals(law)) - {"p"} in PLACES for law in laws) < 2:
+        return None
+    sizes = left_in_noises(findings.problem, findings.selection.fit, chosen)
+    name = max(sizes, key=lambda each: sizes[each])
+    if sizes[name] <= MOST_OF_SHAPES:
+        return None
+    return Reason("misfit", sizes[name], MOST_OF_SHAPES, of=BY_QUANTITY[name].name, final=True)
 
 
 def _far_off(findings: Findings) -> Reason | None:
