@@ -93,7 +93,8 @@ def test_effects_that_leave_much_structure_are_not_it(after, structure, figure, 
     before = max(10.0, 2.0 * after)
     problem = SimpleNamespace(count=100, sum_of_squares=lambda model, *_: 100 * model**2)
     selection = SimpleNamespace(
-        chosen=[SimpleNamespace(name="hysteresis")], fit=SimpleNamespace(model=after)
+        chosen=[SimpleNamespace(name="hysteresis", effect="hysteresis")],
+        fit=SimpleNamespace(model=after),
     )
     findings = SimpleNamespace(
         problem=problem,
@@ -107,6 +108,32 @@ def test_effects_that_leave_much_structure_are_not_it(after, structure, figure, 
     if reason is not None:
         said = (reason.why, reason.of, reason.effects, reason.leaves)
         assert said == ("misfit", "load_n", ("hysteresis",), 0.2)
+
+
+@pytest.mark.parametrize(
+    ("effects", "after", "unknown_by"),
+    [
+        (("joint_spring", "joint_weight"), 1.8, 1.8),  # their difference draws any bent curve
+        (("joint_spring", "joint_weight"), 1.05, None),
+        (("joint_spring", "joint_friction"), 1.8, None),
+        (("spring", "cogging"), 3.0, 3.0),
+    ],
+)
+def test_two_laws_of_the_position_leave_noise_or_are_unknown(
+    effects, after, unknown_by, monkeypatch
+):
+    problem = SimpleNamespace(count=100, sum_of_squares=lambda model, *_: 100 * model**2)
+    chosen = [SimpleNamespace(name=name, effect=name) for name in effects]
+    findings = SimpleNamespace(
+        problem=problem,
+        refitted=SimpleNamespace(model=50.0),
+        selection=SimpleNamespace(chosen=chosen, fit=SimpleNamespace(model=after)),
+        adequacy=SimpleNamespace(structure=None),
+    )
+    monkeypatch.setattr(unknown, "left_in_noises", lambda *_: {"contraction": after})
+    reason = leaves_structure(findings, ResidualFraction(0.0, 0.0))
+    assert (reason and reason.figure) == unknown_by
+    assert reason is None or (reason.final and reason.effects == effects)
 
 
 @pytest.mark.campaign
