@@ -318,6 +318,7 @@ def test_what_a_file_need_not_name_is_usual_and_the_same_as_when_added():
     assert [(effect.name, dict(effect.defaults)) for effect in with_defaults] == [
         ("hysteresis", {"memory_at_start": 0.0}),
         ("drive_dead_zone", {"slope": 2.0}),
+        ("contact_friction", {"rise_n": 0.0, "stribeck_speed_mm_per_s": 5.0}),
     ]
     for effect in with_defaults:
         for file_key, value in effect.defaults.items():
