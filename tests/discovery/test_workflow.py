@@ -137,8 +137,8 @@ def test_a_refit_that_fits_its_own_readings_worse_is_discarded(monkeypatch):
     worse = STATION.replace({"drive.gain_n_per_v": 99.0})
     own = workflow._Work._refitted
 
-    def caught(self, problem, journal):
-        fit = own(self, problem, journal)
+    def caught(self, problem):
+        fit = own(self, problem)
         moved = np.array(
             [
                 99.0 if path == "drive.gain_n_per_v" else value

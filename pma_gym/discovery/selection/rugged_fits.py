@@ -38,11 +38,21 @@ TIED, NEAR = 4, 0.02
 """How often the simpler law's number is fitted at most, each time with its twin at what it became;
 the share by which both may differ in the end."""
 
-STARTS = ((1.1, 0.2), (1.1, 0.5), (1.1, 1.0), (1.1, 2.0), (1.4, 1.0), (1.4, 2.0))
+STARTS = (
+    (1.1, 0.2),
+    (1.1, 0.5),
+    (1.1, 1.0),
+    (1.1, 2.0),
+    (1.25, 0.5),
+    (1.25, 1.0),
+    (1.4, 0.5),
+    (1.4, 1.0),
+    (1.4, 2.0),
+)
 """How many times as large as its twin a parameter begins that the simpler law ties to it, and at
 which share of its usual value what does nothing in the simpler law."""
 
-FITTED, REFINED = 3, 2
+FITTED, REFINED = 4, 2
 """How many of the fits to short pieces are fitted to the trials, and how many are refined."""
 
 ALIKE = 4.0

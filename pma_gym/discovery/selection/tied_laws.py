@@ -10,10 +10,10 @@ from pma_gym.discovery.fitting.fit_problem import FitProblem, Fitted
 from pma_gym.discovery.result.estimates import Undetermined
 from pma_gym.effects import CATALOGUE
 
-EQUAL = 1e-3
+EQUAL = 5e-3
 """Share by which two parameters that are held equal may differ in the end."""
 
-ROUNDS = 5
+ROUNDS = 8
 """How often they are held equal anew, each time at what the other became."""
 
 IDLE_SHARE = 0.1
