@@ -29,7 +29,7 @@ SLOWEST_HZ, WIDTH, MOSTLY = 0.4, 0.25, 0.7
 share of it; the least share of the autocorrelation that makes a tone."""
 
 LEAST_PERIODS = 2.0
-"""Fewest periods of a tone in the longest part: what a piece of a second leaves may swing once."""
+"""Least number of a tone's periods in the longest part: what a piece leaves may swing once."""
 
 
 @dataclass(frozen=True)

@@ -62,8 +62,8 @@ RIPPLE = 4.0
 """Periods of a force that is periodic in the position, over half of the trials' longest way."""
 
 LEAST_PERIODS = 1.25
-"""Fewest of its periods over the longest way: of a wave that is never seen to repeat a bump at an
-end of the way is a part, too."""
+"""Least number of its periods over the longest way: a bump at an end of the way is part of a wave,
+too, that is never seen to repeat."""
 
 
 @dataclass(frozen=True)
@@ -95,7 +95,7 @@ class Sizes:
         return replace(quantity, usual=float(np.clip(usual, least, quantity.upper)))
 
     def least_periods(self, quantity: Quantity) -> float:
-        """Fewest periods (file unit) that the trials' longest way tells from another law."""
+        """Least periods (file unit) that the trials' longest way tells from another law."""
         least = quantity.from_si(LEAST_PERIODS / (2.0 * self.way))
         return float(np.clip(least, quantity.lower, quantity.upper))
 
