@@ -62,7 +62,7 @@ def with_fast_motion(problem: FitProblem, refitted: Fitted) -> tuple[FitProblem,
         return problem, refitted, ""
     words = (
         f"imposed_motion.bandwidth_hz is taken as {bandwidth:.3g} Hz, not {stated:.4g} Hz, which "
-        "takes more from the recorded motion than its noise: state that in the model"
+        "smooths the recorded motion more than the force bears: state that in the model"
     )
     return faster, again, words
 
