@@ -143,13 +143,12 @@ def direct_command(model: Model) -> str:
     return next((command for drive, command in commands if drive in model.parameters), "")
 
 
-def _imposed(model: Model, trial: Trial) -> tuple[np.ndarray, np.ndarray]:
-    """Positions that are asked for (m), and regulator voltage (V) or, without a line, pressure.
+def imposed_record(model: Model, trial: Trial) -> np.ndarray:
+    """Positions that an imposed motion is asked for (m), or that were measured of it.
 
-    A motion or pressure that was measured and not commanded is the command; no pressure is none.
+    Raises:
+        TrialError: without any, and with too few rows for the motion's bandwidth.
     """
-    drive = model.parameters["imposed_motion"]
-    smooth = drive.bandwidth, following_rate(drive)
     (name,) = model.rig.direct_commands.values()
     positions = _given(trial, name)
     if positions is None:
@@ -157,8 +156,18 @@ def _imposed(model: Model, trial: Trial) -> tuple[np.ndarray, np.ndarray]:
             f"the trial has no motion: give {BY_QUANTITY[name].name}, the position that the drive "
             "was asked for or that was measured, by [columns] if the log has another name for it"
         )
-    _check_bandwidth(trial, drive.bandwidth)
-    motion = motion_command(trial.time, positions, *smooth)
+    _check_bandwidth(trial, model.parameters["imposed_motion"].bandwidth)
+    return positions
+
+
+def _imposed(model: Model, trial: Trial) -> tuple[np.ndarray, np.ndarray]:
+    """Positions that are asked for (m), and regulator voltage (V) or, without a line, pressure.
+
+    A motion or pressure that was measured and not commanded is the command; no pressure is none.
+    """
+    drive = model.parameters["imposed_motion"]
+    smooth = drive.bandwidth, following_rate(drive)
+    motion = motion_command(trial.time, imposed_record(model, trial), *smooth)
     line = model.parameters.get("regulator_line")
     if line is not None:
         return motion, _voltage(trial, "regulator_voltage", "pressure_command", line)

@@ -72,6 +72,18 @@ def test_damping_feels_the_velocity_of_the_motion():
     np.testing.assert_allclose(got[50:-50], expected[50:-50], atol=0.05)
 
 
+@pytest.mark.parametrize("bandwidth", [30.0, 60.0, 100.0])
+def test_a_fast_motion_is_followed_between_the_rows_of_its_record(bandwidth):
+    """A damper feels the spline's own speed, not that of the straight lines between rows."""
+    damping = {"intercept_n_s_per_mm": 1.0, "slope_n_s_per_mm_per_kpa": 0.0}
+    fast = imposed(symmetric_damping=damping).replace({"imposed_motion.bandwidth_hz": bandwidth})
+    record = 0.02 * SINE * np.sin(2.0 * np.pi * 5.0 * TIME)
+    wanted = -1000.0 * smoothed(TIME, record, bandwidth)[1]
+    got = Plant(fast).simulate(Trial(TIME, {"contraction_command": record}), noise=False)
+    errors = (got.measurements["force"] - wanted)[50:-50]
+    assert np.sqrt(np.mean(errors**2)) < 1e-3 * np.sqrt(np.mean(wanted**2))
+
+
 @pytest.mark.parametrize("pressure", [150e3, 400e3])
 def test_a_muscle_pulls_by_its_own_laws(pressure):
     station = load_model("serres2008")

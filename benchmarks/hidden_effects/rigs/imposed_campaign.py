@@ -25,6 +25,10 @@ MOTION = "contraction_command_mm"
 FORCE = "force_n"
 """Column of what the load cell reads."""
 
+FINER = 10
+"""Steps of a motion between two rows of its log: its speed is a difference over two of them, and
+errs by less than any load cell's noise."""
+
 
 @dataclass(frozen=True)
 class ImposedCampaign:
@@ -121,8 +125,8 @@ def draw_tested(
     lengths = draw_lengths(rng, rig.rate, rig.frequency)
     lengths = [lengths[i % len(lengths)] for i in range(count)]
     motions = [
-        _turned(rig, draw_reference(rng, rig.travel, rig.frequency, rig.rate, rows))
-        for rows in (round(each * rig.rate) for each in lengths)
+        _turned(rig, draw_reference(rng, rig.travel, rig.frequency, FINER * rig.rate, steps))
+        for steps in (FINER * round(each * rig.rate) for each in lengths)
     ]
     repeats = {}
     if rng.random() < 0.8:
@@ -140,12 +144,12 @@ def draw_tested(
 
 
 def _turned(rig: ImposedRig, motion: Reference) -> Reference:
-    """A motion as a machine of finite bandwidth makes it, from rest: its speed never jumps.
+    """Rows of a motion as a machine of finite bandwidth makes it, from rest: no jumps of speed.
 
     It ends a little earlier, since what would come after its end is not known.
     """
-    rows = rig.rate / (2.0 * np.pi * rig.bandwidth)
-    kept = slice(0, len(motion.q) - int(4.0 * rows + 1.0))
+    steps = FINER * rig.rate / (2.0 * np.pi * rig.bandwidth)
+    kept = slice(0, len(motion.q) - int(4.0 * steps + 1.0), FINER)
     return Reference(
-        *(gaussian_filter1d(x, rows, mode="nearest")[kept] for x in vars(motion).values())
+        *(gaussian_filter1d(x, steps, mode="nearest")[kept] for x in vars(motion).values())
     )

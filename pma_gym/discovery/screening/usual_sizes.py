@@ -15,6 +15,7 @@ from scipy.integrate import cumulative_trapezoid
 from pma_gym.data.trial import Trial
 from pma_gym.effects.effect import signals
 from pma_gym.plant import sensors
+from pma_gym.plant.imposed_motion import smoothed
 from pma_gym.plant.model import Model
 from pma_gym.units import Quantity
 
@@ -132,15 +133,20 @@ def sizes(model: Model, trials: Sequence[Trial]) -> Sizes | None:
 
 def _imposed(model: Model, trials: Sequence[Trial]) -> Sizes | None:
     """Of an imposed motion, whose force is what is measured."""
-    motions, pressures = zip(*(sensors.voltages(model, trial) for trial in trials), strict=True)
+    _, pressures = zip(*(sensors.voltages(model, trial) for trial in trials), strict=True)
+    records = [sensors.imposed_record(model, trial) for trial in trials]
+    bandwidth = model.parameters["imposed_motion"].bandwidth
+    moved = [
+        smoothed(trial.time, record, bandwidth)
+        for trial, record in zip(trials, records, strict=True)
+    ]
     (force_read,) = (signal for signal in model.rig.signals if signal.is_force)
     forces = [trial.measurements.get(force_read.name, np.empty(0)) for trial in trials]
     changes = [each - np.nanmedian(each) for each in forces if np.isfinite(each).any()]
     if not changes:
         return None
-    way = 0.5 * max(float(np.ptp(each)) for each in motions)
-    each = zip(trials, motions, strict=True)
-    speed = _large([_speeds(trial.time, motion) for trial, motion in each])
+    way = 0.5 * max(float(np.ptp(motion)) for motion, _, _ in moved)
+    speed = _large([rate for _, rate, _ in moved])
     force = _large(changes)
     if not min(force, speed, way) > 0.0:
         return None

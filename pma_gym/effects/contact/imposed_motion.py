@@ -5,10 +5,11 @@ from typing import Annotated, NamedTuple
 from pma_gym.effects.effect import Effect
 from pma_gym.units import Quantity
 
-FOLLOWING = 2.0
+FOLLOWING = 0.5
 """Corner frequency of the states that follow the motion, in bandwidths of its record.
-`motion_command` compensates their lag. A much higher corner would follow the straight lines
-between the rows of the record and not the motion."""
+`motion_command` compensates their lag. A higher corner follows the straight lines between the rows
+of the record and not the motion: at 0.4 of the rows in a second the speed errs by 0.07 %, with a
+corner of twice the bandwidth by 2 %."""
 
 _TURN = 6.283185307179586
 
@@ -32,7 +33,7 @@ def following_rate(p):
 def imposed_acceleration(command, contraction, velocity, p):
     """Acceleration of the moved part, which follows a command without overshoot.
 
-        x'' = w^2 (c - x) - 2 w x',   w = 2 pi 2 bandwidth
+        x'' = w^2 (c - x) - 2 w x',   w = pi bandwidth
 
     Args:
         command: commanded position c (m), the record advanced by the lag of the states.
