@@ -45,8 +45,8 @@ left, the slopes are wrong, not the law."""
 MOST_OF_SHAPES = 1.25
 """Noises that several laws of the position alone may leave."""
 
-PLACES = ({"position"}, {"angle"}, {"contraction"})
-"""What a law of the position alone takes."""
+PLACES = (set[str](), {"position"}, {"angle"}, {"contraction"})
+"""What a law of the position alone takes, constants among them."""
 
 Why = Literal["unexplained", "misfit", "explained", "slow", "autocorrelated", "scatters", "outdone"]
 """`unexplained`: the residual is no noise, and no effect was added. `misfit`: nor is it, it exceeds
@@ -140,17 +140,29 @@ def leaves_structure(findings: Findings, left: ResidualFraction) -> Reason | Non
 def _drawn_by_shapes(findings: Findings) -> Reason | None:
     """Two laws of the position alone, such as a spring and a weight, that leave more than noise.
 
-    Their difference draws any bent curve about as well; where both are there they leave noise.
+    Their difference draws any bent curve about as well, and so does each of two rivals with the
+    model's own parameters refitted; where the right ones are there they leave noise.
     """
-    chosen = findings.selection.chosen
-    laws = [CATALOGUE[each.effect].law for each in chosen]
-    if sum(law is not None and set(signals(law)) - {"p"} in PLACES for law in laws) < 2:
+    chosen, drawing = findings.selection.chosen, []
+    for place, candidate in enumerate(chosen):
+        if _of_place(candidate.effect):
+            rivals = findings.rivals[place] if findings.rivals else ()
+            drawing.append(candidate.effect)
+            drawing += [rival.candidate.effect for rival in rivals if rival.equal]
+    drawing = [name for name in drawing if _of_place(name)]
+    if len(drawing) < 2:
         return None
     sizes = left_in_noises(findings.problem, findings.selection.fit, chosen)
     name = max(sizes, key=lambda each: sizes[each])
     if sizes[name] <= MOST_OF_SHAPES:
         return None
     return Reason("misfit", sizes[name], MOST_OF_SHAPES, of=BY_QUANTITY[name].name, final=True)
+
+
+def _of_place(name: str) -> bool:
+    """Whether an effect's law takes the position alone, or nothing: a constant."""
+    law = CATALOGUE[name].law
+    return law is not None and set(signals(law)) - {"p"} in PLACES
 
 
 def _far_off(findings: Findings) -> Reason | None:
