@@ -45,6 +45,14 @@ BOUNDLESS = 3000.0
 """How many times a parameter's value a hundredth of its bounds' width is, from which on the bounds
 of what is positive say nothing of its scale."""
 
+FARTHER = 1e3
+"""A hundredth of a range over a value, from which on the least move is a share of so many times the
+value, and not of the range."""
+
+SHARES, WILD = (1e-2, 1e-4, 1e-6), 100.0
+"""Shares of the first moves that are tried where larger ones lead to what cannot be simulated, or
+change the measurements by more than so many times what is left of them."""
+
 CLOSE = 1e-3
 """A fit has converged when a further step would lower chi-square, counted in its mean per residual,
 by less than this: the parameters are within sqrt(CLOSE) = 3 % of a standard error of the best."""
@@ -153,11 +161,11 @@ class LevenbergMarquardt:
         if before is not None:
             self.values, self.moves, self.rate = before.values, before.moves, before.rate
             self.rounds, self.simulated = before.rounds, before.simulated
-        self.best = self._sums(self.values)
+        self.best = self._first_sums()
         if before is not None and not np.isfinite(self.best.chi_square):
             # What fits a few trials may balance no load in another.
             self.values = np.clip(residuals.start, self.lower, self.upper)
-            self.best = self._sums(self.values)
+            self.best = self._first_sums()
         if not np.isfinite(self.best.chi_square):
             raise ValueError(
                 f"model {residuals.plant.model.name} cannot be simulated where the fit begins: its "
@@ -213,6 +221,22 @@ class LevenbergMarquardt:
         self.rate = self._step(0.0)[1] / promise
         return False
 
+    def _first_sums(self) -> Sums:
+        """Sums at the beginning, by smaller moves where the first ones lead to another rig there.
+
+        Twice a damping that differs by direction may drive what it slows down.
+        """
+        first = moves = self.moves
+        sums = self._sums(self.values)
+        for share in SHARES:
+            left = np.sqrt(max(sums.chi_square, self.residuals.count))
+            changed = np.sqrt(np.abs(np.diag(sums.curvature))) * moves
+            if np.isfinite(sums.chi_square) and np.all(changed <= WILD * left):
+                break
+            self.moves = moves = share * first
+            sums = self._sums(self.values)
+        return sums
+
     def _last(self, step: Array, promise: float) -> bool:
         """Take a step after which none should be needed; whether chi-square falls as promised."""
         tried = np.clip(self.values + step, self.lower, self.upper)
@@ -237,8 +261,9 @@ class LevenbergMarquardt:
     def _next_moves(self, values: Array, sums: Sums) -> Array:
         shown = np.sqrt(np.diag(sums.curvature) / self.residuals.count)
         scales = self._scales(values)
+        least = np.where(values != 0.0, np.minimum(FARTHER * np.abs(values), scales), scales)
         with np.errstate(divide="ignore"):
-            return np.clip(SHOWN / shown, LEAST_MOVE * scales, MOST_MOVE * scales)
+            return np.clip(SHOWN / shown, LEAST_MOVE * least, MOST_MOVE * scales)
 
     def _scales(self, values: Array) -> Array:
         width = 1e-2 * (self.upper - self.lower)

@@ -307,15 +307,16 @@ def test_a_matrix_that_lapack_gives_up_on_is_solved_all_the_same(monkeypatch):
     np.testing.assert_allclose(curvature @ step, -gradient, rtol=1e-9)
 
 
-@pytest.mark.parametrize("size", [1.0, 1e-4])
-def test_an_effect_of_a_small_joint_is_fitted_as_that_of_a_large_one(size):
+@pytest.mark.parametrize("begun", [0.001, 0.003, 0.02, -0.05])
+@pytest.mark.parametrize("size", [1e3, 1.0, 1e-4])
+def test_an_effect_of_a_small_joint_is_fitted_as_that_of_a_large_one(size, begun):
     """A step of the range that the catalogue allows its damping would run away."""
     tables = {"joint_directional_damping": {"difference_n_m_s": 0.004 * size}}
     hidden = joint(0.02 * size, joint_damping={"coefficient_n_m_s": 0.08 * size}, **tables)
     time = np.arange(0.0, 2.0, 0.01)
     torque = 0.1 * size * np.sin(2.0 * np.pi * time)
     log = Plant(hidden).simulate(Trial(time, {"torque_command": torque}), seed=1)
-    wrong = hidden.replace({"joint_directional_damping.difference_n_m_s": 0.001 * size})
+    wrong = hidden.replace({"joint_directional_damping.difference_n_m_s": begun * size})
     path = "joint_directional_damping.difference_n_m_s"
     result = fit(wrong, [log], [path])
     (low, high) = 0.0035 * size, 0.0045 * size

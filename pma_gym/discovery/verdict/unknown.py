@@ -45,6 +45,10 @@ left, the slopes are wrong, not the law."""
 MOST_OF_SHAPES = 1.25
 """Noises that several laws of the position alone may leave."""
 
+MOST_OF_RIVALS = 0.05
+"""Share of the misfit beyond noise (sum of squares) that one law of the position alone may leave
+where a rival draws the rest as well: a right law leaves less, whatever smaller effect is beside."""
+
 PLACES = (set[str](), {"position"}, {"angle"}, {"contraction"})
 """What a law of the position alone takes, constants among them."""
 
@@ -125,11 +129,11 @@ def leaves_structure(findings: Findings, left: ResidualFraction) -> Reason | Non
     problem, chosen = findings.problem, findings.selection.chosen
     if not chosen:
         return None
-    drawn = _drawn_by_shapes(findings)
-    if drawn is not None:
-        return replace(drawn, effects=tuple(each.name for each in chosen), leaves=left.slow)
     before = problem.sum_of_squares(findings.refitted.model) - problem.count
     after = problem.sum_of_squares(findings.selection.fit.model, chosen) - problem.count
+    drawn = _drawn_by_shapes(findings, after > MOST_OF_RIVALS * before)
+    if drawn is not None:
+        return replace(drawn, effects=tuple(each.name for each in chosen), leaves=left.slow)
     if after <= MOST_APPROXIMATE * before:
         return None
     reason = _inadequate(findings) or _far_off(findings)
@@ -137,18 +141,22 @@ def leaves_structure(findings: Findings, left: ResidualFraction) -> Reason | Non
     return None if reason is None else replace(reason, effects=names, leaves=left.slow)
 
 
-def _drawn_by_shapes(findings: Findings) -> Reason | None:
+def _drawn_by_shapes(findings: Findings, much: bool) -> Reason | None:
     """Two laws of the position alone, such as a spring and a weight, that leave more than noise.
 
     Their difference draws any bent curve about as well, and so does each of two rivals with the
     model's own parameters refitted; where the right ones are there they leave noise.
+
+    Args:
+        findings: what the steps found.
+        much: whether so much of the misfit is left that rivals count.
     """
     chosen, drawing = findings.selection.chosen, []
     for place, candidate in enumerate(chosen):
         if _of_place(candidate.effect):
             rivals = findings.rivals[place] if findings.rivals else ()
             drawing.append(candidate.effect)
-            drawing += [rival.candidate.effect for rival in rivals if rival.equal]
+            drawing += [rival.candidate.effect for rival in rivals if rival.equal and much]
     drawing = [name for name in drawing if _of_place(name)]
     if len(drawing) < 2:
         return None

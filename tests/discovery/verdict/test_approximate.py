@@ -111,21 +111,24 @@ def test_effects_that_leave_much_structure_are_not_it(after, structure, figure, 
 
 
 @pytest.mark.parametrize(
-    ("effects", "rivals", "after", "unknown_by"),
+    ("effects", "rivals", "before", "after", "unknown_by"),
     [
-        (("joint_spring", "joint_weight"), (), 1.8, 1.8),  # their difference draws any bent curve
-        (("joint_spring", "joint_weight"), (), 1.05, None),
-        (("joint_spring", "joint_friction"), (), 1.8, None),
-        (("spring", "cogging"), (), 3.0, 3.0),
-        (("constant_torque",), ("joint_hardening_spring",), 1.8, 1.8),
-        (("constant_torque",), ("joint_hardening_spring",), 1.05, None),
-        (("constant_torque",), (), 1.8, None),
-        (("constant_torque",), ("joint_friction",), 1.8, None),
-        (("joint_friction",), ("joint_spring", "constant_torque"), 1.8, None),
+        # The difference of two draws any bent curve.
+        (("joint_spring", "joint_weight"), (), 50.0, 1.8, 1.8),
+        (("joint_spring", "joint_weight"), (), 50.0, 1.05, None),
+        (("joint_spring", "joint_friction"), (), 50.0, 1.8, None),
+        (("spring", "cogging"), (), 50.0, 3.0, 3.0),
+        (("constant_torque",), ("joint_hardening_spring",), 4.0, 1.8, 1.8),
+        (("constant_torque",), ("joint_hardening_spring",), 4.0, 1.05, None),
+        # What closes 99.9 % is it; something small is beside.
+        (("constant_torque",), ("joint_hardening_spring",), 50.0, 1.8, None),
+        (("constant_torque",), (), 4.0, 1.8, None),
+        (("constant_torque",), ("joint_friction",), 4.0, 1.8, None),
+        (("joint_friction",), ("joint_spring", "constant_torque"), 4.0, 1.8, None),
     ],
 )
 def test_two_laws_of_the_position_leave_noise_or_are_unknown(
-    effects, rivals, after, unknown_by, monkeypatch
+    effects, rivals, before, after, unknown_by, monkeypatch
 ):
     problem = SimpleNamespace(count=100, sum_of_squares=lambda model, *_: 100 * model**2)
     chosen = [SimpleNamespace(name=name, effect=name) for name in effects]
@@ -135,7 +138,7 @@ def test_two_laws_of_the_position_leave_noise_or_are_unknown(
     )
     findings = SimpleNamespace(
         problem=problem,
-        refitted=SimpleNamespace(model=50.0),
+        refitted=SimpleNamespace(model=before),
         selection=SimpleNamespace(chosen=chosen, fit=SimpleNamespace(model=after)),
         rivals=(equal, *[()] * (len(chosen) - 1)),
         adequacy=SimpleNamespace(structure=None),
