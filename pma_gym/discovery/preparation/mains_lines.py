@@ -33,6 +33,9 @@ BESIDE_HZ = np.array([-2.5, -2.1, -1.7, -1.3, 1.3, 1.7, 2.1, 2.5])
 LEAST_ALIAS_HZ = 4.0
 """Alias below which a line is not looked for: commands excite the rig there."""
 
+SLOW = 6
+"""Powers of the time, from 0 on, that are slow."""
+
 FINER = 41
 """Frequencies that are tried about the best of those steps."""
 
@@ -139,9 +142,12 @@ def _near(hertz: float, duration: float) -> Array:
 def _power(hertz: Array, time: Array, part: Array) -> float:
     """Sum of squares (SI) that a line of free amplitude and phase explains of one trial.
 
-    The largest of some frequencies, shape (n,).
+    The largest of some frequencies, shape (n,). What is slow in a trial ends otherwise than it
+    begins, which has a part at every frequency: it is taken out.
     """
     known = np.isfinite(part)
-    values, times = part[known] - part[known].mean(), time[known]
+    times = time[known]
+    slow = np.vander((times - times[0]) / max(times[-1] - times[0], 1e-300), SLOW)
+    values = part[known] - slow @ np.linalg.lstsq(slow, part[known], rcond=None)[0]
     sums = [np.exp(-2j * np.pi * each * times) @ values for each in hertz]
     return float(2.0 * np.max(np.abs(sums)) ** 2 / known.sum())

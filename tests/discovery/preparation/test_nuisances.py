@@ -151,6 +151,20 @@ def test_only_mains_and_their_aliases_are_lines() -> None:
     assert all(not each.lines for each in with_lines(_levels(), logged, left)[:CHANNEL])
 
 
+@pytest.mark.parametrize("phase", [0.0, 0.9])
+def test_pieces_of_a_large_slow_misfit_have_no_lines(phase: float) -> None:
+    """A piece of a second ends otherwise than it begins, which has a part at every frequency."""
+    rng, time = np.random.default_rng(4), np.arange(128) / RATE
+    logged, _ = _logged([np.zeros(128)] * 200)
+    left = []
+    for number in range(200):
+        part = np.full((4, 128), np.nan)
+        slow = 60.0 * np.sin(2 * np.pi * 0.4 * (time + number) + phase)
+        part[CHANNEL] = LEVEL * (rng.standard_normal(128) + slow)
+        left.append(part)
+    assert with_lines(_levels(), logged, left)[CHANNEL] == _levels()[CHANNEL]
+
+
 def test_a_projection_makes_noise_with_a_drift_white() -> None:
     """Its matrix is the inverse root of the covariance, and what is free leaves nothing."""
     logged, _ = _logged([np.zeros(200)])
