@@ -56,6 +56,10 @@ def with_lines(
         logged: the trials.
         left: simulated less measured (SI), NaN where not measured, shape (signals, rows) each.
     """
+    left = [
+        np.stack([_without_slow(trial.time, row) for row in part])
+        for part, trial in zip(left, logged, strict=True)
+    ]
     lines: list[list[float]] = [[] for _ in noise]
     powers = np.zeros(len(noise))
     for mains in MAINS_HZ:
@@ -106,7 +110,8 @@ def _frequency(
 
 def line_size(hertz: float, logged: Sequence[Logged], parts: Sequence[Array]) -> float:
     """Size of a line in residuals of one signal (rms, SI)."""
-    return _line(hertz, logged, parts)[0]
+    pairs = zip(parts, logged, strict=True)
+    return _line(hertz, logged, [_without_slow(trial.time, part) for part, trial in pairs])[0]
 
 
 def _line(hertz: float, logged: Sequence[Logged], parts: Sequence[Array]) -> tuple[float, float]:
@@ -142,12 +147,21 @@ def _near(hertz: float, duration: float) -> Array:
 def _power(hertz: Array, time: Array, part: Array) -> float:
     """Sum of squares (SI) that a line of free amplitude and phase explains of one trial.
 
-    The largest of some frequencies, shape (n,). What is slow in a trial ends otherwise than it
-    begins, which has a part at every frequency: it is taken out.
+    The largest of some frequencies, shape (n,).
     """
     known = np.isfinite(part)
-    times = time[known]
-    slow = np.vander((times - times[0]) / max(times[-1] - times[0], 1e-300), SLOW)
-    values = part[known] - slow @ np.linalg.lstsq(slow, part[known], rcond=None)[0]
+    values, times = part[known] - part[known].mean(), time[known]
     sums = [np.exp(-2j * np.pi * each * times) @ values for each in hertz]
     return float(2.0 * np.max(np.abs(sums)) ** 2 / known.sum())
+
+
+def _without_slow(time: Array, part: Array) -> Array:
+    """A trial's residual of one signal less what is slow in it, shape (rows,).
+
+    What ends otherwise than it begins has a part at every frequency.
+    """
+    known = np.isfinite(part)
+    if known.sum() <= SLOW:
+        return part
+    slow = np.vander((time - time[0]) / (time[-1] - time[0]), SLOW)
+    return part - slow @ np.linalg.lstsq(slow[known], part[known], rcond=None)[0]
