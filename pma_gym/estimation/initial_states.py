@@ -8,10 +8,13 @@ initial position and speed together with the other parameters.
 """
 
 from collections.abc import Sequence
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pma_gym.data.signals import Signal
+from pma_gym.data.trial import Trial
 from pma_gym.estimation.logged import Logged
 
 Array = NDArray[np.float64]
@@ -23,9 +26,21 @@ MOVE = 1e-3
 """Differences of initial position and speed (SI)."""
 
 
-def starts(trials: Sequence[Logged]) -> tuple[Array, Array]:
-    """Estimate the initial position and speed of trials (SI), shape (trials,) each."""
-    fitted = np.array([_start(logged) for logged in trials])
+_known: WeakKeyDictionary[Trial, tuple[tuple[Signal, ...], tuple[float, float]]] = (
+    WeakKeyDictionary()
+)
+
+
+def starts(trials: Sequence[Trial], read: Sequence[Logged]) -> tuple[Array, Array]:
+    """Estimate the initial position and speed of trials (SI), shape (trials,) each.
+
+    Args:
+        trials: the trials; an estimate is kept as long as its trial, which many fits begin from.
+        read: the same as they are read.
+    """
+    fitted = np.array(
+        [_kept_start(trial, logged) for trial, logged in zip(trials, read, strict=True)]
+    )
     return fitted[:, 0], fitted[:, 1]
 
 
@@ -74,6 +89,13 @@ def put_zero(positions: Array, logged: Logged) -> None:
     if counts.any():
         off = (logged.measured[0] - positions) @ counts / counts.sum()
         positions += off[:, None]
+
+
+def _kept_start(trial: Trial, logged: Logged) -> tuple[float, float]:
+    kept = _known.get(trial)
+    if kept is None or kept[0] != logged.signals:
+        kept = _known[trial] = (logged.signals, _start(logged))
+    return kept[1]
 
 
 def _start(logged: Logged) -> tuple[float, float]:

@@ -94,7 +94,7 @@ class SimulatedTrials:
         self._own: list[tuple[int, Array]] = []
         self._begun: list[tuple[int, Array]] = []
         if self.plant.model.rig.is_free:
-            where, speed = initial_states.starts(self._trials)
+            where, speed = initial_states.starts(trials, self._trials)
             paths = dict(
                 zip(self.plant.model.rig.start_paths.values(), (where, speed), strict=True)
             )

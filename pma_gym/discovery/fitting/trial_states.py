@@ -109,7 +109,7 @@ def _possible(model: Model, trial: Trial, velocity: float) -> float:
     (low,), (high,) = bounds([path])
     if low <= velocity <= high:
         return velocity
-    _, read = starts([Logged.of(model, 0, trial)])
+    _, read = starts([trial], [Logged.of(model, 0, trial)])
     return float(np.clip(read[0] / SI_FACTORS[unit(path)], low, high))
 
 
