@@ -49,7 +49,7 @@ FARTHER = 1e3
 """A hundredth of a range over a value, from which on the least move is a share of so many times the
 value, and not of the range."""
 
-SHARES, FARTHEST = (1e-2, 1e-4, 1e-6), 100.0
+SHARES, TOO_MUCH = (1e-2, 1e-4, 1e-6), 100.0
 """Shares of the first moves that are tried where larger ones lead to what cannot be simulated, or
 change the measurements by more than so many times what is left of them."""
 
@@ -231,7 +231,7 @@ class LevenbergMarquardt:
         for share in SHARES:
             left = np.sqrt(max(sums.chi_square, self.residuals.count))
             changed = np.sqrt(np.abs(np.diag(sums.curvature))) * moves
-            if np.isfinite(sums.chi_square) and np.all(changed <= FARTHEST * left):
+            if np.isfinite(sums.chi_square) and np.all(changed <= TOO_MUCH * left):
                 break
             self.moves = moves = share * first
             sums = self._sums(self.values)
