@@ -26,8 +26,8 @@ FORCE = "force_n"
 """Column of what the load cell reads."""
 
 FINER = 10
-"""Steps of a motion between two rows of its log: its speed is a difference over two of them, and
-errs by less than any load cell's noise."""
+"""Steps of a motion between two rows of its log: its speed is a difference over two of them, which
+errs by a hundredth of what one over two rows does."""
 
 
 @dataclass(frozen=True)

@@ -8,8 +8,8 @@ from pma_gym.units import Quantity
 FOLLOWING = 0.5
 """Corner frequency of the states that follow the motion, in bandwidths of its record.
 `motion_command` compensates their lag. A higher corner follows the straight lines between the rows
-of the record and not the motion: at 0.4 of the rows in a second the speed errs by 0.07 %, with a
-corner of twice the bandwidth by 2 %."""
+of the record and not the motion. For a sine of 5 Hz at 250 rows a second and a bandwidth of 100 Hz
+the speed errs by 0.07 %, with a corner of twice the bandwidth by 2 %."""
 
 _TURN = 6.283185307179586
 
