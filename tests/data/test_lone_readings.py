@@ -55,6 +55,21 @@ def test_what_a_rig_does_is_no_outlier(size):
     assert without_lone_readings([trial_of(row, command)])[1] == []
 
 
+def test_a_slip_that_a_controller_answers_stands_alone_in_noise_with_heavy_tails():
+    """The command jumps in the row of a slip and back in the next: that moves no slide at once."""
+    generator = np.random.default_rng(5)
+    rows = generator.choice(np.arange(5, 1495, 9), 12, replace=False)
+    heavy = NOISE * generator.standard_t(4.0, TIME.size) / np.sqrt(2.0)
+    row = 0.02 + 0.01 * np.sin(TIME) + heavy
+    row[rows] += 25.0 * NOISE * np.array([1.0, -1.0] * 6)
+    command = 2.0 + 0.1 * np.sin(TIME)
+    command[rows] -= 100.0 * (row[rows] - 0.02)
+    (kept,), (words,) = without_lone_readings([trial_of(row, command)])
+    taken = set(np.flatnonzero(np.isnan(kept.measurements["contraction"])))
+    assert len(taken & set(rows)) >= 11, words
+    assert len(taken - set(rows)) <= 4
+
+
 def test_steps_of_a_coarse_sensor_are_no_outliers():
     row = 3e-4 * np.round(quiet(2) / 3e-4)
     assert without_lone_readings([trial_of(row)])[1] == []

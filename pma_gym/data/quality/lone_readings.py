@@ -2,7 +2,9 @@
 
 Such a reading lies far from the curve through its four neighbours, and they lie on it. A step, a
 kink or an oscillation moves neighbours as well; what follows a jump of a command within a few rows
-is left alone whatever its form.
+is left alone whatever its form. A controller answers a slip with such a jump: of positions and
+speeds, which no force moves in the row in which it comes, only what comes after a jump is left
+alone.
 """
 
 from collections.abc import Mapping, Sequence
@@ -11,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from pma_gym.data.signals import SIGNALS
 from pma_gym.data.trial import Trial
 from pma_gym.data.trial_columns import BY_QUANTITY
 from pma_gym.units import SI_FACTORS
@@ -32,9 +35,9 @@ SIDE, MISS, UNEVEN = -2.0 / 3.0, 0.2, 0.4
 """Distance of the readings before and after from their curves, which go through the lone one, over
 its own; how far their mean may be off, and how much they may differ."""
 
-BESIDE, QUIET = 4, 1.6
-"""Rows beside one that stands alone which a slip must explain, and how many standard deviations it
-may leave of them: a beat leaves more."""
+BESIDE, QUIET, REST = 4, 1.6, 0.1
+"""Rows beside one that stands alone which a slip must explain; how many standard deviations it may
+leave of them, or which share of itself, where noise has heavy tails: a beat leaves more."""
 
 SPREAD = np.sqrt(1.0 + 34.0 / 36.0)
 """Standard deviations of a reading's distance from its curve, in those of a reading."""
@@ -112,7 +115,8 @@ def _lone(trials: Sequence[Trial], quantity: str) -> LoneReadings | None:
         number: _alone(trials[number].measurements[quantity], each, limit, noise / SPREAD)
         for number, each in apart.items()
     }
-    rows = {number: at & ~_after_jumps(trials[number]) for number, at in rows.items()}
+    moves = SIGNALS[quantity].is_position or SIGNALS[quantity].is_speed
+    rows = {number: at & ~_by_jumps(trials[number], moves) for number, at in rows.items()}
     rows = {number: at for number, at in rows.items() if at.any()}
     count = sum(int(at.sum()) for at in rows.values())
     if not limit > 0.0 or not count or count > MOST * known.size:
@@ -146,18 +150,18 @@ def _alone(row: Array, apart: Array, limit: float, noise: float) -> Rows:
 
 
 def _is_slip(about: Array, most: float) -> bool:
-    """Whether a slip of the middle row leaves at most so much (rms), and less than a step does."""
+    """Whether a slip of the middle row leaves little (rms), and less than a step does."""
     along = np.arange(-BESIDE, BESIDE + 1.0)
     curve = [np.ones_like(along), along, along**2]
 
-    def left(change: Array) -> float:
+    def left(change: Array) -> tuple[float, float]:
         columns = np.stack([*curve, change], axis=1)
         sizes = np.linalg.lstsq(columns, about, rcond=None)[0]
-        return float(np.sum((about - columns @ sizes) ** 2))
+        return float(np.sum((about - columns @ sizes) ** 2)), float(abs(sizes[-1]))
 
-    slip = left((along == 0.0).astype(float))
-    steps = [left((along >= edge).astype(float)) for edge in (-1.0, 0.0, 1.0, 2.0)]
-    return slip < min(steps) and slip < most**2 * (along.size - 4)
+    slip, size = left((along == 0.0).astype(float))
+    steps = [left((along >= edge).astype(float))[0] for edge in (-1.0, 0.0, 1.0, 2.0)]
+    return slip < min(steps) and slip < max(most, REST * size) ** 2 * (along.size - 4)
 
 
 def _like_slips(apart: Array, limit: float) -> Rows:
@@ -171,8 +175,8 @@ def _like_slips(apart: Array, limit: float) -> Rows:
     return far & even & like
 
 
-def _after_jumps(trial: Trial) -> Rows:
-    """Rows beside a jump of a command."""
+def _by_jumps(trial: Trial, moves: bool) -> Rows:
+    """Rows beside a jump of a command; of what a force moves, those after it alone."""
     near = np.zeros(len(trial), bool)
     for row in trial.commands.values():
         known = row[np.isfinite(row)]
@@ -180,5 +184,5 @@ def _after_jumps(trial: Trial) -> Rows:
             continue
         jumps = np.flatnonzero(np.abs(np.diff(np.nan_to_num(row))) > JUMP * np.ptp(known))
         for at in jumps:
-            near[max(0, at - NEAR) : at + NEAR + 2] = True
+            near[at + 2 if moves else max(0, at - NEAR) : at + NEAR + 2] = True
     return near
