@@ -4,10 +4,13 @@ An error of 0.2 mm/s in the initial speed causes 0.2 mm within a second, far mor
 noise; no derivative of the first measurements is that accurate. Every trial is therefore simulated
 again with another initial speed, and with another initial position if the rig defines its zero.
 Linear combinations of these simulations fit the measurements. To first order this estimates the
-initial position and speed together with the other parameters.
+initial position and speed together with the other parameters. Where the first estimate is so far
+off that the equations bend on the way, the trial begins again from the corrected one.
 """
 
+import math
 from collections.abc import Sequence
+from typing import NamedTuple
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -24,6 +27,10 @@ FIRST_S, FIRST_ROWS = 0.05, 8
 
 MOVE = 1e-3
 """Differences of initial position and speed (SI)."""
+
+BENDS, RESTARTS = 3.0, 3
+"""Square of a correction, over the level of the noise times what the trial goes through, from which
+on a trial begins again, and how often: that is what a bend in its equations may be off by."""
 
 
 _known: WeakKeyDictionary[Trial, tuple[tuple[Signal, ...], tuple[float, float]]] = (
@@ -44,7 +51,21 @@ def starts(trials: Sequence[Trial], read: Sequence[Logged]) -> tuple[Array, Arra
     return fitted[:, 0], fitted[:, 1]
 
 
-def meet(states: Array, held: Array, logged: Logged, levels: Array, further: int) -> None:
+class Correction(NamedTuple):
+    """How the first of some simulations was corrected.
+
+    Attributes:
+        moves: how far its start was off, in `MOVE`, shape (further,).
+        misfit: sum of squares of what it left of the readings before.
+        rough: whether the start was so far off that the equations bend on the way.
+    """
+
+    moves: Array
+    misfit: float
+    rough: bool
+
+
+def meet(states: Array, held: Array, logged: Logged, levels: Array, further: int) -> Correction:
     """Correct simulations for their initial states, so that they fit the measurements.
 
     Args:
@@ -71,11 +92,17 @@ def meet(states: Array, held: Array, logged: Logged, levels: Array, further: int
     with np.errstate(over="ignore", invalid="ignore"):
         sizes = moves @ moves.T
     if not np.isfinite(sizes).all() or not sizes.any():
-        return
+        return Correction(np.zeros(further), np.inf, False)
     # What one start does as well as the other is shared between them.
-    shares = np.concatenate(off, axis=1) @ moves.T @ np.linalg.pinv(sizes, hermitian=True)
+    wanted = np.concatenate(off, axis=1)
+    shares = wanted @ moves.T @ np.linalg.pinv(sizes, hermitian=True)
     for share, moved in zip(shares.T, states[-further:] - states[0], strict=True):
         states[:-further] += share[:, None, None] * moved
+    first = measured[0]
+    span = float(np.ptp(logged.measured[first, _there(logged, first)]))
+    most = float(np.abs(shares[0] @ along[0]).max())
+    rough = math.isfinite(most) and most**2 > BENDS * float(levels[first]) * span
+    return Correction(shares[0], float(wanted[0] @ wanted[0]), rough)
 
 
 def put_zero(positions: Array, logged: Logged) -> None:

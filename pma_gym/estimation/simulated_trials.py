@@ -152,14 +152,16 @@ class SimulatedTrials:
         for block in self._blocks(8 * number * count):
             runs, spaces = [], self._spaces(block, count)
             for i, space in zip(block, spaces, strict=True):
-                logged = self._trials[i]
-                columns = (logged.time, logged.motor, logged.regulator, self.interpolation)
-                runs += [
-                    Run(*columns, tables[i][k], states[i, k], zeros[i, k], FIRST_S, space[k])
-                    for k in range(count)
-                ]
+                runs += self._runs(i, tables[i], states[i], zeros[i], space)
             simulate_all(self.plant.program, runs, self.threads)
-            if moved:
+            if self._begun:
+                rows = [slice(i * count, (i + 1) * count) for i in block]
+                each = zip(block, spaces, rows, strict=True)
+                spaces = [
+                    self._met_freely(i, space, zeros[i], vectors, every[of], tables[i])
+                    for i, space, of in each
+                ]
+            elif moved:
                 each = zip(block, spaces, strict=True)
                 spaces = [self._met(i, space, zeros[i], vectors) for i, space in each]
             results += work(block, spaces, zeros[block, : len(tried)], vectors)
@@ -180,8 +182,6 @@ class SimulatedTrials:
 
         The last of those given are the first with another start; x0 moves with them.
         """
-        if self._begun:
-            return self._met_freely(space, zeros, vectors, self._trials[number])
         shares = self._start_shares(number, space, zeros, vectors)
         space[:-1] += shares[:, None, None] * (space[-1] - space[0])
         zeros[:-1] += shares * (zeros[-1] - zeros[0])
@@ -200,16 +200,60 @@ class SimulatedTrials:
         """Differences (SI), (tried, signals, rows), in units of noise, (tried, numbers)."""
         return (left / self.deviations[:, None]).reshape(len(left), -1)
 
-    def _met_freely(self, space: Array, zeros: Array, vectors: Array, logged: Logged) -> Array:
-        """States of a free rig, begun as fits best; shape (tried, rows, states)."""
-        tried, further = len(vectors), len(space) - len(vectors)
-        every = np.concatenate([vectors, *([vectors[:1]] * further)])
-        held = np.stack(self._held(space, zeros, every), axis=1)
-        initial_states.meet(space, held, logged, self._levels, further)
+    def _met_freely(
+        self,
+        number: int,
+        space: Array,
+        zeros: Array,
+        vectors: Array,
+        every: Array,
+        tables: list[Array],
+    ) -> Array:
+        """States of a free rig's trial, begun as fits best; shape (tried, rows, states).
+
+        Args:
+            number: of the trial.
+            space: its states, with other starts in the last ones.
+            zeros: x0 of each.
+            vectors: parameters that were tried.
+            every: parameters of the trial in each simulation, its start among them.
+            tables: of each simulation.
+        """
+        tried, further, logged = len(vectors), len(space) - len(vectors), self._trials[number]
+        last = np.concatenate([vectors, *([vectors[:1]] * further)])
+        before, least = space[:0], np.inf
+        for restart in range(initial_states.RESTARTS + 1):
+            held = np.stack(self._held(space, zeros, last), axis=1)
+            met = initial_states.meet(space, held, logged, self._levels, further)
+            if restart and not met.misfit < least:
+                # Where dry friction sticks, no move of the start tells what the next one does.
+                space[:tried] = before
+                break
+            if not met.rough or restart == initial_states.RESTARTS:
+                break
+            before, least = space[:tried].copy(), met.misfit
+            for (place, _), move in zip(self._begun[-further:], met.moves.tolist(), strict=True):
+                every[:, place] += initial_states.MOVE * move
+            first = np.repeat([logged.first], len(space), axis=0).T
+            states, zeros[:] = solver.equilibria_at(self.plant, first[0], first[1], every)
+            simulate_all(
+                self.plant.program, self._runs(number, tables, states, zeros, space), self.threads
+            )
         position = self.plant.model.rig.signals[0]
         if position.has_free_zero and f"{SENSOR_DELAY}{position.name}" in self._ports:
             initial_states.put_zero(space[:tried, :, self.plant.sensor_columns[0]], logged)
         return space[:tried]
+
+    def _runs(
+        self, number: int, tables: list[Array], states: Array, zeros: Array, space: Array
+    ) -> list[Run]:
+        """Simulations of a trial from states, with tables and x0 of each, into `space`."""
+        logged = self._trials[number]
+        columns = (logged.time, logged.motor, logged.regulator, self.interpolation)
+        return [
+            Run(*columns, tables[k], states[k], zeros[k], FIRST_S, space[k])
+            for k in range(len(space))
+        ]
 
     @property
     def _levels(self) -> Array:
