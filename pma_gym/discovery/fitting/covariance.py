@@ -2,8 +2,8 @@
 
 The curvature of chi-square alone says how sure parameters are if nothing is left but noise. What is
 left of a real rig is slow too, and pulls at parameters for seconds together. So the pull of
-stretches of time is looked at, of a second and of whole trials (the sandwich of Huber and White, by
-clusters), and the largest error of the three counts.
+stretches of time is looked at, of a second, of ever twice as long and of whole trials (the sandwich
+of Huber and White, by clusters), and the largest error of all counts.
 """
 
 from collections.abc import Sequence
@@ -18,7 +18,10 @@ from pma_gym.discovery.preparation.whitened_residuals import PIECE_S, Pieces
 Array = NDArray[np.float64]
 
 STRETCH_S = 1.0
-"""Length of a stretch of time (s)."""
+"""Length of the shortest stretches of time (s)."""
+
+LEAST_STRETCHES = 10
+"""Fewer stretches than this are too few to tell how parameters scatter between them."""
 
 LEAST_TRIALS = 4
 """Fewer trials than this say nothing of how parameters scatter between them."""
@@ -37,17 +40,32 @@ def covariance(problem: FitProblem, fit: Fitted, chosen: Sequence[CandidateEffec
     known = np.isfinite(np.diag(fit.covariance))
     pulls = pieces.products[:, 1:, 0][:, known]
     inverse = fit.covariance[np.ix_(known, known)]
-    squares = widened(np.diag(inverse), pulls, inverse, clusters(pieces))
+    squares = widened(np.diag(inverse), pulls, inverse, clusters(pieces, problem.runs))
     wider = np.ones(len(known))
     wider[known] = np.sqrt(squares / np.diag(inverse))
     return fit.covariance * np.outer(wider, wider)
 
 
-def clusters(pieces: Pieces) -> list[NDArray[np.int64]]:
-    """Of every piece, its stretch of time; and its trial, where there are trials enough."""
-    order = np.arange(len(pieces.trial)) - np.searchsorted(pieces.trial, pieces.trial)
-    stretch = order // round(STRETCH_S / PIECE_S)
-    groups = [pieces.trial * (stretch.max() + 1) + stretch]
+def clusters(pieces: Pieces, runs: Sequence[int] = ()) -> list[NDArray[np.int64]]:
+    """Of every piece, its stretch of time; and its trial, where there are trials enough.
+
+    Args:
+        pieces: of the trials.
+        runs: number of the run that each trial is a part of, one after the other; each is a run of
+            its own if not given. What is slow in a run goes on from part to part.
+    """
+    run = np.asarray(runs)[pieces.trial] if len(runs) else pieces.trial
+    order = np.arange(len(run)) - np.searchsorted(run, run)
+    length, groups = round(STRETCH_S / PIECE_S), []
+    while True:
+        stretch = order // length
+        group = run * (stretch.max() + 1) + stretch
+        if groups and len(np.unique(group)) < LEAST_STRETCHES:
+            break
+        groups.append(group)
+        if not stretch.any():
+            break
+        length *= 2
     if len(np.unique(pieces.trial)) >= LEAST_TRIALS:
         groups.append(pieces.trial)
     return groups

@@ -155,6 +155,12 @@ class FitProblem:
         return self.wholes[number] if self.wholes else number
 
     @property
+    def runs(self) -> list[int]:
+        """Of each trial, the number of the file that it comes from."""
+        numbers: dict[str, int] = {}
+        return [numbers.setdefault(file, len(numbers)) for file in self.files]
+
+    @property
     def journal_key(self) -> str:
         """What tells its fits from those of the same diagnosis with other noise or other pieces."""
         return f"{self.noise}{f' pieces of {self.wholes}' if self.wholes else ''}"

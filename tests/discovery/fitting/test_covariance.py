@@ -8,7 +8,7 @@ import pytest
 from scipy.signal import lfilter
 
 from pma_gym.data.trial import Trial
-from pma_gym.discovery.fitting.covariance import covariance
+from pma_gym.discovery.fitting.covariance import LEAST_STRETCHES, clusters, covariance
 from pma_gym.discovery.preparation.whitened_residuals import Pieces
 from pma_gym.discovery.screening.candidates import candidate_effects
 from pma_gym.discovery.verdict.homogeneity_test import homogeneity_test, newton_step
@@ -46,6 +46,27 @@ def test_what_is_left_for_seconds_widens_errors():
     slow = [wandering(trial, seed) for seed, trial in enumerate(trials)]
     assert widened(slow).max() > 2.0
     assert widened(slow).max() > 1.5 * widened(trials).max()
+
+
+def lengths(trials, runs=()):
+    """Trials of so many pieces: in how many clusters they are, for each way of making clusters."""
+    trial = np.repeat(np.arange(len(trials)), trials)
+    pieces = Pieces(np.zeros((len(trial), 1, 1)), trial, np.ones(len(trial), int))
+    return [len(np.unique(group)) for group in clusters(pieces, runs)]
+
+
+def test_stretches_grow_until_there_are_few():
+    # 64 pieces of a quarter of a second each: stretches of 1, 2 and 4 s, and no longer ones.
+    assert lengths([64, 64, 64]) == [48, 24, 12]
+    assert min(lengths([64, 64, 64])) >= LEAST_STRETCHES
+    # Trials count where there are four.
+    assert lengths([64] * 4) == [64, 32, 16, 4]
+
+
+def test_pieces_of_one_run_are_one_after_the_other():
+    assert lengths([4] * 12, [0] * 12) == [12, 12]
+    assert lengths([4] * 24, [0] * 24) == [24, 12, 24]
+    assert lengths([4] * 24, [0] * 12 + [1] * 12) == [24, 12, 24]
 
 
 @cache
