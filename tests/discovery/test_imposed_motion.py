@@ -70,6 +70,24 @@ def test_friction_that_grows_with_pressure_is_named_with_its_slope():
 
 
 @pytest.mark.campaign
+def test_a_drag_beside_friction_is_no_friction_that_falls_with_speed():
+    """Beside a law that falls with speed the drag does not show: friction of 38 N, rise 1.7 N."""
+    tables = {"intercept_n_s_per_mm": 0.5, "slope_n_s_per_mm_per_kpa": 0.0}
+    hidden = {
+        "contact_friction": {"force_n": 40.0, "presliding_um": 50.0},
+        "quadratic_drag": {"coefficient_n_s2_per_mm2": 3e-4},
+        "symmetric_damping": tables | {"intercept_n_s_per_mm": 0.55},
+    }
+    known = imposed(force_sensor=SENSOR, symmetric_damping=tables)
+    diagnosis = diagnose(trials(strokes=(0.03, 0.06), **hidden), known, propose=False)
+    sizes = sizes_of(diagnosis)
+    assert {name.partition(".")[0] for name in sizes} == {"contact_friction", "quadratic_drag"}
+    assert "contact_friction.rise_n" not in sizes
+    assert sizes["contact_friction.force_n"] == pytest.approx(40.0, rel=0.01)
+    assert sizes["quadratic_drag.coefficient_n_s2_per_mm2"] == pytest.approx(3e-4, rel=0.05)
+
+
+@pytest.mark.campaign
 def test_nothing_hidden_names_nothing():
     spring = {"piston_force": {"area_mm2": 490.0}}
     given = trials((100e3, 300e3), **spring)

@@ -27,6 +27,7 @@ from pma_gym.discovery.selection.candidate_fits import (
     without_idle,
 )
 from pma_gym.discovery.selection.exchanged_effects import Round, exchanged
+from pma_gym.discovery.selection.instead_of_terms import instead_of_term
 from pma_gym.discovery.selection.rugged_fits import is_rugged, settled
 from pma_gym.discovery.selection.scanned_parameters import with_scanned
 from pma_gym.discovery.selection.stages import Stage, stage_of
@@ -173,6 +174,9 @@ def _with_added(
         stages.append(stage)
         added = _likeliest(stage, stages[0])
         if added is None:
+            other = instead_of_term(problem, best, chosen, rest, seed, journal, progress)
+            if other is not None:
+                stages[-1], chosen, best = other
             break
         new = next(each for each in candidates if each.name == added)
         chosen = (*chosen, stage.scanned.get(added, new))
