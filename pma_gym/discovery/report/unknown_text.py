@@ -33,6 +33,7 @@ def unknown_sentence(diagnosis: Diagnosis, reason: Reason, trials: str) -> str:
         "autocorrelated": _autocorrelated,
         "scatters": _scatters,
         "outdone": _outdone,
+        "undetermined": _undetermined,
     }[reason.why]
     return (
         f"Something is missing in model {diagnosis.given.name} that {_not_carried(diagnosis)}: "
@@ -138,6 +139,13 @@ def _scatters(reason: Reason, _: str) -> str:
     return (
         f"but the size of {effect_name(reason.of)} scatters {by} by {share}, where that of the "
         f"right law does by {limit} at most"
+    )
+
+
+def _undetermined(reason: Reason, _: str) -> str:
+    return (
+        "but beside each other they are not determined: "
+        f"{'either' if len(reason.effects) == 2 else 'each'} may be absent"
     )
 
 

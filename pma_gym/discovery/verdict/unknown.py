@@ -52,12 +52,25 @@ where a rival draws the rest as well: a right law leaves less, whatever smaller 
 PLACES = (set[str](), {"position"}, {"angle"}, {"contraction"})
 """What a law of the position alone takes, constants among them."""
 
-Why = Literal["unexplained", "misfit", "explained", "slow", "autocorrelated", "scatters", "outdone"]
+ABSENT = 1.96
+"""Standard errors of its size within which an effect may be absent."""
+
+Why = Literal[
+    "unexplained",
+    "misfit",
+    "explained",
+    "slow",
+    "autocorrelated",
+    "scatters",
+    "outdone",
+    "undetermined",
+]
 """`unexplained`: the residual is no noise, and no effect was added. `misfit`: nor is it, it exceeds
 the signal's floor (`adequacy`). `explained`: nor is it, a flexible regression explains it. `slow`:
 too much of what was slow in it is left. `autocorrelated`: too much of its autocorrelated part is
 left. `scatters`: an effect has another size by trial or condition. `outdone`: a freely drawn law
-explains more."""
+explains more. `undetermined`: each of several laws of the position may be absent beside the
+others."""
 
 
 @dataclass(frozen=True)
@@ -67,8 +80,8 @@ class Reason:
     Attributes:
         why: see `Why`.
         figure: what was found: standard errors (`unexplained`), floors (`misfit`, `explained`), a
-            share (`slow`, `autocorrelated`, `scatters`), or the fall of chi-square by the law
-            (`outdone`).
+            share (`slow`, `autocorrelated`, `scatters`), the fall of chi-square by the law
+            (`outdone`), or the size of an effect in its standard errors (`undetermined`).
         limit: the most that it may be, in the same unit.
         effects: what was added; empty if nothing was.
         nearest: the likeliest effect, where nothing was added; empty if none was looked at.
@@ -131,7 +144,7 @@ def leaves_structure(findings: Findings, left: ResidualFraction) -> Reason | Non
         return None
     before = problem.sum_of_squares(findings.refitted.model) - problem.count
     after = problem.sum_of_squares(findings.selection.fit.model, chosen) - problem.count
-    drawn = _drawn_by_shapes(findings, after > MOST_OF_RIVALS * before)
+    drawn = _undetermined(findings) or _drawn_by_shapes(findings, after > MOST_OF_RIVALS * before)
     if drawn is not None:
         return replace(drawn, effects=tuple(each.name for each in chosen), leaves=left.slow)
     if after <= MOST_APPROXIMATE * before:
@@ -139,6 +152,29 @@ def leaves_structure(findings: Findings, left: ResidualFraction) -> Reason | Non
     reason = _inadequate(findings) or _far_off(findings)
     names = tuple(candidate.name for candidate in chosen)
     return None if reason is None else replace(reason, effects=names, leaves=left.slow)
+
+
+def _undetermined(findings: Findings) -> Reason | None:
+    """Several laws of the position alone, each of which may be absent beside the others.
+
+    Together they draw a curve that neither has: a spring and a weight far from where they are
+    relaxed draw a bumper.
+    """
+    fit, sizes = findings.selection.fit, list[float]()
+    for candidate in findings.selection.chosen:
+        if not _of_place(candidate.effect):
+            continue
+        named = zip(candidate.paths, candidate.amplitudes, candidate.absent.tolist(), strict=True)
+        known = [
+            (*fit.estimate(path), neutral)
+            for path, amplitude, neutral in named
+            if amplitude and path in candidate.fitted_paths
+        ]
+        sizes.append(max((abs(size - none) / error for size, error, none in known), default=np.inf))
+    undetermined = [size for size in sizes if size < ABSENT]
+    if len(undetermined) < 2:
+        return None
+    return Reason("undetermined", max(undetermined), ABSENT, final=True)
 
 
 def _drawn_by_shapes(findings: Findings, much: bool) -> Reason | None:

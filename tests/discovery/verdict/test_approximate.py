@@ -6,6 +6,7 @@ from functools import cache
 from types import SimpleNamespace
 from unittest import mock
 
+import numpy as np
 import pytest
 
 from pma_gym.discovery.report.approximate_text import left_text, why_approximate
@@ -131,7 +132,7 @@ def test_two_laws_of_the_position_leave_noise_or_are_unknown(
     effects, rivals, before, after, unknown_by, monkeypatch
 ):
     problem = SimpleNamespace(count=100, sum_of_squares=lambda model, *_: 100 * model**2)
-    chosen = [SimpleNamespace(name=name, effect=name) for name in effects]
+    chosen = [sized(name) for name in effects]
     equal = tuple(
         SimpleNamespace(candidate=SimpleNamespace(name=name, effect=name), equal=True)
         for name in rivals
@@ -139,7 +140,7 @@ def test_two_laws_of_the_position_leave_noise_or_are_unknown(
     findings = SimpleNamespace(
         problem=problem,
         refitted=SimpleNamespace(model=before),
-        selection=SimpleNamespace(chosen=chosen, fit=SimpleNamespace(model=after)),
+        selection=SimpleNamespace(chosen=chosen, fit=fit_with(after, 5.0)),
         rivals=(equal, *[()] * (len(chosen) - 1)),
         adequacy=SimpleNamespace(structure=None),
     )
@@ -147,6 +148,51 @@ def test_two_laws_of_the_position_leave_noise_or_are_unknown(
     reason = leaves_structure(findings, ResidualFraction(0.0, 0.0))
     assert (reason and reason.figure) == unknown_by
     assert reason is None or (reason.final and reason.effects == effects)
+
+
+@pytest.mark.parametrize(
+    ("effects", "errors", "unknown_by"),
+    [
+        (("joint_spring", "joint_weight"), 0.4, 0.4),
+        (("joint_spring", "joint_weight"), 2.5, None),
+        (("joint_spring", "joint_friction"), 0.4, None),
+        (("joint_spring",), 0.4, None),
+    ],
+)
+def test_two_laws_of_the_position_that_may_be_absent_are_unknown(
+    effects, errors, unknown_by, monkeypatch
+):
+    """Their sizes, so many standard errors, are those of a curve that neither has."""
+    chosen = [sized(name) for name in effects]
+    findings = SimpleNamespace(
+        problem=SimpleNamespace(count=100, sum_of_squares=lambda model, *_: 100 * model**2),
+        refitted=SimpleNamespace(model=50.0),
+        selection=SimpleNamespace(chosen=chosen, fit=fit_with(1.0, errors)),
+        rivals=((),) * len(chosen),
+        adequacy=SimpleNamespace(structure=None),
+    )
+    monkeypatch.setattr(unknown, "left_in_noises", lambda *_: {"contraction": 1.0})
+    reason = leaves_structure(findings, ResidualFraction(0.0, 0.0))
+    assert (reason and reason.figure) == unknown_by
+    assert reason is None or (reason.why, reason.final) == ("undetermined", True)
+
+
+def sized(name):
+    """A candidate with one size, 0 where it is absent."""
+    path = f"{name}.size"
+    return SimpleNamespace(
+        name=name,
+        effect=name,
+        paths=[path],
+        fitted_paths=[path],
+        amplitudes=np.array([True]),
+        absent=np.zeros(1),
+    )
+
+
+def fit_with(model, errors):
+    """A fit whose sizes are so many standard errors."""
+    return SimpleNamespace(model=model, estimate=lambda path: (errors, 1.0))
 
 
 @pytest.mark.campaign

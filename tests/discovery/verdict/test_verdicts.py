@@ -233,6 +233,11 @@ UNKNOWN = {
         "force on the slide drawn freely over contraction explains more: it lowers chi-square by "
         "812, they by 420, and up to 483 would be no better.",
     ),
+    "undetermined": (
+        Reason("undetermined", 0.4, 1.96, ("joint_spring", "joint_weight"), leaves=0.0, final=True),
+        "the best, joint spring and joint weight, leave 0 % of what is slow in the residual of "
+        "these 3 trials, but beside each other they are not determined: either may be absent.",
+    ),
     "unexplained": (
         Reason("unexplained", 14.2, 6.0, nearest="creep", leaves=0.983, of="rotation_deg"),
         "none was added (the likeliest, creep, would leave 98 % of chi-square), and the "
