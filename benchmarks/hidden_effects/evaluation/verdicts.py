@@ -8,6 +8,7 @@ from benchmarks.hidden_effects.generation.effects import ALL
 from benchmarks.hidden_effects.generation.expected_parameters import expected
 from benchmarks.hidden_effects.generation.groups import group
 from benchmarks.hidden_effects.generation.likelihood_ratios import UNTOLD
+from benchmarks.hidden_effects.rigs import sizes
 from pma_gym.discovery.diagnosis import Verdict
 
 STRUCTURAL = ("effect", "unknown")
@@ -285,8 +286,10 @@ def _left(truth: Mapping[str, Any], answer: Mapping[str, Any]) -> float | None:
 def _sizes(outcome: Outcome, truth: Mapping[str, Any], effects: list[Mapping[str, Any]]) -> None:
     parameters = {effect["name"]: effect["parameters"] for effect in effects}
     for effect in truth["effects"]:
-        values = effect.get("expected")
-        if values is None:
+        if truth["block"] == "rigs":
+            kind = truth["rig"].get("kind", "imposed")
+            values = sizes.expected(kind, effect["name"], effect["parameters"])
+        else:
             values = expected(effect["name"], effect["parameters"])
         for name, value in values.items():
             estimates = parameters.get(effect["name"], {})

@@ -7,7 +7,7 @@ import numpy as np
 
 from benchmarks.hidden_effects.rigs.driven_campaign import draw_driven
 from benchmarks.hidden_effects.rigs.imposed_campaign import draw_tested
-from benchmarks.hidden_effects.rigs.laws import CoulombFriction, HiddenEffect, PressureFriction
+from benchmarks.hidden_effects.rigs.laws import HiddenEffect
 from benchmarks.hidden_effects.rigs.offers import KNOWN, OFFERS, OUTSIDE, catalogue_name, group
 from benchmarks.hidden_effects.rigs.rig import log_uniform
 
@@ -121,19 +121,5 @@ def _described(campaign: Campaign, effect: HiddenEffect) -> dict[str, Any]:
         "name": name,
         "group": group(name),
         "parameters": effect.values(),
-        "expected": expected(campaign.rig.kind, effect),
         "r": campaign.ratio(effect),
     }
-
-
-def expected(kind: str, effect: HiddenEffect) -> dict[str, float]:
-    """Values in file units, by the catalogue's parameter, that describe a hidden effect."""
-    if isinstance(effect, CoulombFriction):
-        level = {"joint": "dynamic_n_m", "slide": "dynamic_n", "imposed": "force_n"}[kind]
-        return {level: effect.size}
-    if isinstance(effect, PressureFriction):
-        return {"slope_n_per_kpa": 1e3 * effect.size * effect.slope}
-    return {
-        "drive_delay": {"delay_ms": 1e3 * effect.size},
-        "drive_lag": {"time_constant_ms": 1e3 * effect.size},
-    }.get(effect.name, {})

@@ -23,8 +23,8 @@ LONGEST, SHORTEST = 0.25e-3, 0.01e-3
 RADIUS = 0.1
 """Of gyration of a slide's body (m); only its drag depends on it."""
 
-FAR = 6.0
-"""Where transverse springs are anchored, in half strokes: 2 % off a cube at the end of it."""
+FAR = 60.0
+"""Where transverse springs are anchored, in half strokes: 0.02 % off a cube at the end of it."""
 
 
 class NoMujoco(ImportError):

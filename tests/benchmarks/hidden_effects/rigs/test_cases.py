@@ -15,9 +15,11 @@ from benchmarks.hidden_effects.rigs import drawing, effect_size, files
 from benchmarks.hidden_effects.rigs.driven_campaign import draw_driven
 from benchmarks.hidden_effects.rigs.lab_names import GERMAN, METRES, OURS
 from benchmarks.hidden_effects.rigs.laws import ConstantForce
-from benchmarks.hidden_effects.rigs.offers import KNOWN, OFFERS, group
+from benchmarks.hidden_effects.rigs.offers import KNOWN, OFFERS, catalogue_name, group
 from benchmarks.hidden_effects.rigs.rig import draw_joint, draw_slide
+from benchmarks.hidden_effects.rigs.sizes import expected
 from pma_gym.data.datasets.dataset import read_dataset
+from pma_gym.effects import CATALOGUE
 from tests.benchmarks.hidden_effects.cheap_diagnosis import document
 
 CHEAP = (1, 1)
@@ -129,7 +131,7 @@ def test_rigs_are_of_all_sizes_and_keep_their_limits(draw):
 
 
 def test_the_step_of_an_encoder_may_be_named_beside_what_is_hidden():
-    friction = ("coulomb_friction", {"dynamic_n": 2.0})
+    friction = ("coulomb_friction", 2.0)
     both = answer("effect", 0.01, ("sensor_quantisation", {}), ("coulomb_friction", {}))
     coarse = {"true_besides": ["sensor_quantisation"]}
     named = compare(truth("one effect", friction) | coarse, both)
@@ -137,6 +139,14 @@ def test_the_step_of_an_encoder_may_be_named_beside_what_is_hidden():
     plain = answer("effect", 0.01, ("sensor_quantisation", {}))
     assert not compare(truth("nothing") | coarse, plain).detected
     assert compare(truth("nothing"), plain).detected
+
+
+def test_what_is_hidden_has_its_size_in_the_unit_of_the_catalogue():
+    for kind, names in KNOWN.items():
+        for name in (catalogue_name(kind, each) for each in names):
+            ((key, size),) = expected(kind, name, {"size": 3.0, "slope": 1.0}).items()
+            quantity = CATALOGUE[name].quantities[CATALOGUE[name].names_in_files()[key]]
+            assert abs(size) == pytest.approx(quantity.from_si(3.0))
 
 
 def test_what_cannot_be_hidden_together_is_of_one_group():
@@ -147,11 +157,12 @@ def test_what_cannot_be_hidden_together_is_of_one_group():
 
 def truth(kind, *effects, noise=0.01):
     hidden = [
-        {"name": name, "group": group(name), "parameters": {}, "expected": expected, "r": 1.0}
-        for name, expected in effects
+        {"name": name, "group": group(name), "parameters": {"size": size}, "r": 1.0}
+        for name, size in effects
     ]
     return {
         "block": "rigs",
+        "rig": {"kind": "slide"},
         "kind": kind,
         "effects": hidden,
         "base_factors": {},
@@ -169,19 +180,19 @@ def value(number, low, high):
 
 
 def test_answers_are_judged_by_what_their_case_hides():
-    friction = ("coulomb_friction", {"dynamic_n": 2.0})
+    friction = ("coulomb_friction", 2.0)
     named = ("coulomb_friction", {"dynamic_n": value(2.1, 1.9, 2.3)})
     pairs = [
         (truth("one effect", friction), answer("effect", 0.01, named)),
-        (truth("one effect", ("drive_delay", {})), answer("effect", 0.01, ("drive_lag", {}))),
+        (truth("one effect", ("drive_delay", 0.01)), answer("effect", 0.01, ("drive_lag", {}))),
         (truth("one effect", friction), answer("effect", 0.01, ("drive_lag", {}))),
         (truth("one effect", friction), answer("parameters", 0.04)),
         (truth("one effect", friction), answer("parameters", 0.02)),
-        (truth("two effects", friction, ("drive_lag", {})), answer("effect", 0.01, named)),
+        (truth("two effects", friction, ("drive_lag", 0.01)), answer("effect", 0.01, named)),
         (truth("nothing"), answer("unknown", 0.01)),
         (truth("nothing"), answer("parameters", 0.01)),
-        (truth("outside", ("outside: one detent", {})), answer("unknown", 0.01)),
-        (truth("outside", ("outside: one detent", {})), answer("effect", 0.01, named)),
+        (truth("outside", ("outside: one detent", 1.0)), answer("unknown", 0.01)),
+        (truth("outside", ("outside: one detent", 1.0)), answer("effect", 0.01, named)),
     ]
     figures = count([compare(*each) for each in pairs])["blocks"]["rigs"]
     rates = {name: (each["hits"], each["n"]) for name, each in figures["rates"].items()}

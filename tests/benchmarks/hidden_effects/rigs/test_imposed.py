@@ -110,6 +110,11 @@ def test_a_dwelling_machine_keeps_the_force_that_it_came_with(simulate):
     assert force[4000] == pytest.approx(400.0 * 0.02 + 6.0, abs=1e-3)
 
 
+def test_a_hardening_spring_is_a_cube(simulate):
+    added = simulate(RIG, (laws.HardeningSpring(1e6),), SINE, 0.0) - simulate(RIG, (), SINE, 0.0)
+    assert added == pytest.approx(1e6 * SINE.q**3, abs=1e-3 * 1e6 * 0.05**3)
+
+
 MEASURED = (
     "coulomb_friction",
     "pressure_dependent_friction",
