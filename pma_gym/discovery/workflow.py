@@ -136,7 +136,7 @@ class _Work:
         trials = [each.trial for each in named]
         given, slower = with_recorded_bandwidth(given, trials)
         words = (*(dataset.checked or ()), *words, *slower)
-        journal = Journal(self.folder, trials, given, f"diagnosis 6 seed {self.seed}")
+        journal = Journal(self.folder, trials, given, f"diagnosis 7 seed {self.seed}")
         logged = [Logged.of(given, i, trial) for i, trial in enumerate(trials)]
         floors = self._timed("noise", lambda: initial_floors(given, logged, named, dataset.sensors))
         problem = self._problem(given, named, logged, floors)
@@ -304,7 +304,8 @@ class _Work:
                 simulated_less_measured(whitened, findings.unseen.readings),
             )
         folds = fold_of_rows(problem.trials, problem.files)
-        judged = adequacy(logged, unseen_, fitted, floors, folds, self.seed)
+        answered = findings.given.rig.is_free
+        judged = adequacy(logged, unseen_, fitted, floors, folds, self.seed, answered)
         return replace(findings, adequacy=judged)
 
     def _adequate(self, findings: Findings, logged: Sequence[Logged]) -> Findings:

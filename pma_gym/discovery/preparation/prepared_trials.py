@@ -43,8 +43,8 @@ def prepared(named: Sequence[NamedTrial], model: Model) -> tuple[list[NamedTrial
         if len(pieces) > len(kept):
             whole = f"its {len(kept)} trials are" if len(kept) > 1 else "its trial is"
             words.append(
-                f"nothing holds this {model.rig.name}, so {whole} taken as {len(pieces)} pieces of "
-                f"up to {PIECE_S:g} s, each with its own start"
+                f"errors of force add up in the motion of a {model.rig.name}, so {whole} taken as "
+                f"{len(pieces)} pieces of up to {PIECE_S:g} s, each with its own start"
             )
         kept = pieces
     elif stretches(trials):
