@@ -28,9 +28,10 @@ FIRST_S, FIRST_ROWS = 0.05, 8
 MOVE = 1e-3
 """Differences of initial position and speed (SI)."""
 
-BENDS, RESTARTS = 3.0, 3
+BENDS, BENDING_S, RESTARTS = 3.0, 0.5, 3
 """Square of a correction, over the level of the noise times what the trial goes through, from which
-on a trial begins again, and how often: that is what a bend in its equations may be off by."""
+on a trial begins again, if it is so long (s), and how often: that is what a bend in its equations
+may be off by. In short pieces equations hardly bend, and a wrong model's corrections are large."""
 
 
 _known: WeakKeyDictionary[Trial, tuple[tuple[Signal, ...], tuple[float, float]]] = (
@@ -101,7 +102,8 @@ def meet(states: Array, held: Array, logged: Logged, levels: Array, further: int
     first = measured[0]
     span = float(np.ptp(logged.measured[first, _there(logged, first)]))
     most = float(np.abs(shares[0] @ along[0]).max())
-    rough = math.isfinite(most) and most**2 > BENDS * float(levels[first]) * span
+    bends = math.isfinite(most) and most**2 > BENDS * float(levels[first]) * span
+    rough = bends and bool(logged.time[-1] - logged.time[0] > BENDING_S)
     return Correction(shares[0], float(wanted[0] @ wanted[0]), rough)
 
 
