@@ -28,10 +28,13 @@ FIRST_S, FIRST_ROWS = 0.05, 8
 MOVE = 1e-3
 """Differences of initial position and speed (SI)."""
 
-BENDS, BENDING_S, RESTARTS = 3.0, 0.5, 3
+BENDS, RESTARTS = 3.0, 3
 """Square of a correction, over the level of the noise times what the trial goes through, from which
-on a trial begins again, if it is so long (s), and how often: that is what a bend in its equations
-may be off by. In short pieces equations hardly bend, and a wrong model's corrections are large."""
+on a trial begins again, and how often: that is what a bend in its equations may be off by."""
+
+BENDING_S, LEAVES = 0.5, 0.01
+"""Length (s) of a trial that begins again, and share of the misfit (sum of squares) that the
+correction may leave: where more is left the model is wrong, and a search over lines is smoother."""
 
 
 _known: WeakKeyDictionary[Trial, tuple[tuple[Signal, ...], tuple[float, float]]] = (
@@ -103,8 +106,13 @@ def meet(states: Array, held: Array, logged: Logged, levels: Array, further: int
     span = float(np.ptp(logged.measured[first, _there(logged, first)]))
     most = float(np.abs(shares[0] @ along[0]).max())
     bends = math.isfinite(most) and most**2 > BENDS * float(levels[first]) * span
-    rough = bends and bool(logged.time[-1] - logged.time[0] > BENDING_S)
-    return Correction(shares[0], float(wanted[0] @ wanted[0]), rough)
+    misfit, rest = float(wanted[0] @ wanted[0]), wanted[0] - shares[0] @ moves
+    rough = (
+        bends
+        and bool(logged.time[-1] - logged.time[0] > BENDING_S)
+        and float(rest @ rest) < LEAVES * misfit
+    )
+    return Correction(shares[0], misfit, rough)
 
 
 def put_zero(positions: Array, logged: Logged) -> None:
