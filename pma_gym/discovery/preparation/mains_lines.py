@@ -108,6 +108,18 @@ def _frequency(
     return float(near[np.argmax([power(hertz) for hertz in near])])
 
 
+def is_told(hertz: float, rate: float, beside: float) -> bool:
+    """Whether a line's alias lies above what commands excite, and below half the rate.
+
+    Args:
+        hertz: its frequency.
+        rate: readings a second (Hz).
+        beside: how far below half the rate it lies at least (Hz).
+    """
+    alias = abs(hertz - rate * round(hertz / rate))
+    return LEAST_ALIAS_HZ < alias < 0.5 * rate - beside
+
+
 def line_size(hertz: float, logged: Sequence[Logged], parts: Sequence[Array]) -> float:
     """Size of a line in residuals of one signal (rms, SI)."""
     pairs = zip(parts, logged, strict=True)
@@ -121,9 +133,9 @@ def _line(hertz: float, logged: Sequence[Logged], parts: Sequence[Array]) -> tup
         known = int(np.isfinite(part).sum())
         if known < 4 * len(BESIDE_HZ):
             continue
-        rate = 1.0 / float(np.median(np.diff(trial.time)))
-        alias = abs(hertz - rate * np.round(hertz / rate))
-        if not LEAST_ALIAS_HZ < alias < 0.5 * rate - 1.0 / (trial.time[-1] - trial.time[0]):
+        # Rows without a reading, which commands need, say nothing of how often one is taken.
+        rate = 1.0 / float(np.median(np.diff(trial.time[np.isfinite(part)])))
+        if not is_told(hertz, rate, 1.0 / float(trial.time[-1] - trial.time[0])):
             return 0.0, 1.0
         # In a long trial the net's own frequency is looked for, and as long beside it.
         near = _near(hertz, float(trial.time[-1] - trial.time[0]))

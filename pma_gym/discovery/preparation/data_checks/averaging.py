@@ -1,10 +1,12 @@
 """Long logs with fewer rows: readings averaged, commands kept.
 
-What a diagnosis costs grows with its rows. Readings are averaged over blocks of rows: nothing
-faster folds into what is left, and their noise falls. The average is a parabola's value at the
-block's middle (Savitzky and Golay), since a plain mean cuts the corners of a course, which a fit
-takes for physics. A block whose readings jump has no such value, and none is given: friction that
-turns round is a step. Commands keep every row that joining the others would miss.
+What a diagnosis costs grows with its rows. Readings are averaged over blocks of rows: their noise
+falls. The average is a parabola's value at the block's middle (Savitzky and Golay), since a plain
+mean cuts the corners of a course, which a fit takes for physics. The price is that it passes 0.8 of
+a wave as long as a block, which folds to a slow one: 60 Hz to 2.5 Hz where 1 kHz is averaged over
+16 rows. A block is therefore as long as keeps the lines of mains from folding to where they are
+not looked for. A block whose readings jump has no value, and none is given: friction that turns
+round is a step. Commands keep every row that joining the others would miss.
 """
 
 import math
@@ -16,6 +18,7 @@ from numpy.typing import NDArray
 
 from pma_gym.data.datasets.dataset import NamedTrial
 from pma_gym.data.trial import Trial
+from pma_gym.discovery.preparation.mains_lines import HARMONICS, MAINS_HZ, is_told
 from pma_gym.discovery.preparation.noise import level_of_neighbours
 
 Array = NDArray[np.float64]
@@ -28,6 +31,12 @@ AIM_ROWS = 16_000
 
 SLOWEST_HZ = 60.0
 """Least rate that is left: slower would hide the rotor's oscillation on the cable."""
+
+PASSES = 0.2
+"""Largest share of a line of mains that may be left where it is not told."""
+
+NYQUIST_HZ = 1.0
+"""How near to half the rate that is left a line may lie."""
 
 PARABOLA = 4
 """Fewest readings that a parabola is drawn through."""
@@ -62,7 +71,7 @@ def averaged(named: Sequence[NamedTrial]) -> tuple[list[NamedTrial], list[str]]:
     if total <= MOST_ROWS:
         return list(named), []
     wanted = math.ceil(total / AIM_ROWS)
-    factors = [max(1, min(wanted, int(_rate(each.trial) / SLOWEST_HZ))) for each in named]
+    factors = [_factor(_rate(each.trial), wanted) for each in named]
     kept, off = list(named), _unseen(named)
     for factor in sorted(set(factors) - {1}):
         of_rate = [k for k, each in enumerate(factors) if each == factor]
@@ -89,6 +98,32 @@ def averaged(named: Sequence[NamedTrial]) -> tuple[list[NamedTrial], list[str]]:
 def _rate(trial: Trial) -> float:
     """Rows a second."""
     return 1.0 / float(np.median(np.diff(trial.time)))
+
+
+def _factor(rate: float, wanted: int) -> int:
+    """Rows of a block: as wanted, or as many fewer (to half) as the lines of mains ask for."""
+    most = max(1, min(wanted, int(rate / SLOWEST_HZ)))
+    tried = range(most, most // 2, -1)
+    passed = [_untold(rate, factor) for factor in tried]
+    clear = [factor for factor, share in zip(tried, passed, strict=True) if share <= PASSES]
+    return clear[0] if clear else tried[int(np.argmin(passed))]
+
+
+def _untold(rate: float, factor: int) -> float:
+    """Largest share of a line of mains that averages leave where it is told from nothing else.
+
+    Args:
+        rate: rows a second (Hz).
+        factor: rows of a block.
+    """
+    at = (np.arange(factor) - (factor - 1) / 2.0) / rate
+    lines = [mains * harmonic for mains in MAINS_HZ for harmonic in HARMONICS]
+    return max(
+        abs(float(_weights(factor) @ np.cos(2.0 * np.pi * hertz * at)))
+        if is_told(hertz, rate, NYQUIST_HZ) and not is_told(hertz, rate / factor, NYQUIST_HZ)
+        else 0.0
+        for hertz in lines
+    )
 
 
 def _unseen(named: Sequence[NamedTrial]) -> float:

@@ -3,9 +3,11 @@
 import numpy as np
 import pytest
 
-from pma_gym.data.datasets.dataset import read_dataset
+from pma_gym.data.datasets.dataset import NamedTrial, read_dataset
+from pma_gym.data.trial import Trial
 from pma_gym.data.trial_columns import TrialError
 from pma_gym.discovery import diagnose
+from pma_gym.discovery.preparation.data_checks.averaging import averaged
 from pma_gym.plant.model import load_model
 from tests.discovery.preparation.data_checks.logs import GIVEN, checked, log, logs, write
 
@@ -168,6 +170,28 @@ def test_long_logs_are_averaged(tmp_path, monkeypatch):
     assert row[there[70]] == pytest.approx(parabola, abs=1e-9)
     # No corner is cut: the mean of readings of a bent course misses its middle.
     assert abs(block.mean() - parabola) > 1e-4
+
+
+@pytest.mark.parametrize("mains", [50.0, 60.0])
+@pytest.mark.parametrize("rate", [240.0, 250.0, 500.0, 1000.0, 2000.0, 10_000.0])
+def test_hum_of_a_long_log_folds_to_no_slow_wave(rate, mains, monkeypatch):
+    """1 kHz averaged over 16 rows has 0.8 of 60 Hz left, at 2.5 Hz, where a rig moves."""
+    monkeypatch.setattr("pma_gym.discovery.preparation.data_checks.averaging.MOST_ROWS", 1000)
+    monkeypatch.setattr("pma_gym.discovery.preparation.data_checks.averaging.AIM_ROWS", 20)
+    time = np.arange(int(8 * rate)) / rate
+    load = np.sin(2.0 * np.pi * mains * time) + 0.2 * np.cos(2.0 * np.pi * 0.5 * time)
+    trial = Trial(time, {"motor_voltage": 0.0 * time}, {"load": load})
+    (fewer,), (said,) = averaged([NamedTrial("long", trial)])
+    assert "readings are averaged over" in said
+    row = fewer.trial.measurements["load"]
+    known = np.isfinite(row)
+    assert known.sum() < 1 + len(time) / 2
+    hertz = np.arange(1, 30) / 8.0
+    waves = np.exp(-2j * np.pi * hertz[:, None] * fewer.trial.time[known])
+    slow = 2.0 * np.abs(waves @ row[known]) / known.sum()
+    # What the rig does is kept: the parabola's share of a slow wave is 1.
+    assert slow[hertz == 0.5] == pytest.approx(0.2, abs=0.02)
+    assert slow[hertz != 0.5].max() < 0.06
 
 
 def test_a_block_in_which_readings_jump_has_no_average(tmp_path, monkeypatch):
