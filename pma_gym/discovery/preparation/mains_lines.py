@@ -6,6 +6,7 @@ looked for: there it could be the rig.
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -82,7 +83,7 @@ def with_lines(
 def _beside_lines(noise: Whitening, lines: Sequence[float], power: float) -> Whitening:
     """Noise beside its lines, which were in its level as it was known, and in its colour."""
     level = float(np.sqrt(max(noise.level**2 - power, 0.25 * noise.level**2)))
-    return Whitening((), level, level, tuple(lines), noise.drift, noise.waves)
+    return replace(noise, coefficients=(), innovation=level, level=level, lines=tuple(lines))
 
 
 def _frequency(

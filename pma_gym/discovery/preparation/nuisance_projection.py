@@ -105,8 +105,9 @@ def _project(noise: Whitening, logged: Logged, channel: int, free_zero: bool) ->
     known: list[Array] = []
     if noise.drift > 0.0:
         known = [noise.drift * each for each in drift_cosines(logged, noise.waves)]
-    if known and not free_zero:
-        known.append(np.full(len(time), noise.drift))
+    constant = math.hypot(noise.drift, noise.offset)
+    if constant > 0.0 and not free_zero:
+        known.append(np.full(len(time), constant))
 
     def white(columns: list[Array]) -> Array:
         rows = np.reshape(columns, (-1, len(time))).copy()

@@ -221,7 +221,7 @@ class WhitenedResiduals(Residuals):
                 continue
             missing = logged.missing[channel]
             filtered = noise.white(differences[:, channel], missing)
-            if noise.lines or noise.drift:
+            if noise.has_nuisances:
                 self._projection(logged, channel).out_of(filtered)
             elif signal.has_free_zero:
                 one = np.ones(len(logged.time))
@@ -238,7 +238,7 @@ class WhitenedResiduals(Residuals):
         """
         rest = left.copy()
         for channel, noise in enumerate(self.noise):
-            if not logged.measures[channel] or not (noise.lines or noise.drift):
+            if not logged.measures[channel] or not noise.has_nuisances:
                 continue
             missing = logged.missing[channel]
             known = np.where(np.isfinite(left[channel]), left[channel], 0.0)

@@ -41,7 +41,8 @@ def reestimated_noise(
         learnt = autoregression(known, before.level) if known else before
         if known and learnt.level > STRUCTURE * before.level:
             learnt = replace(learnt, coefficients=(), innovation=learnt.level)
-        filters.append(replace(learnt, lines=before.lines, drift=before.drift, waves=before.waves))
+        nuisances = {"drift": before.drift, "waves": before.waves, "offset": before.offset}
+        filters.append(replace(learnt, lines=before.lines, **nuisances))
     return tuple(filters)
 
 

@@ -8,7 +8,7 @@ import pytest
 from pma_gym import Plant, Trial, load_model
 from pma_gym.data.datasets.dataset import NamedTrial
 from pma_gym.discovery import diagnose
-from pma_gym.discovery.preparation.learnt_noise import learnt_noise
+from pma_gym.discovery.preparation.learnt_noise import UNSURE, learnt_noise
 from pma_gym.discovery.preparation.mains_lines import with_lines
 from pma_gym.discovery.preparation.noise import Whitening, white_noise
 from pma_gym.discovery.preparation.nuisance_projection import projection
@@ -76,6 +76,38 @@ def test_repeats_with_holes_tell_the_noise_too() -> None:
     learnt = learnt_noise(_levels(), logged, named)[CHANNEL]
     assert learnt.coefficients[0] == pytest.approx(0.8, abs=0.1)
     assert learnt.drift > LEVEL
+
+
+def test_repeated_pieces_of_runs_tell_a_drift_by_their_constants() -> None:
+    """A wave of 32 s is a constant in each piece of a second; between whole trials it is a zero."""
+    rng, at = np.random.default_rng(8), np.arange(2 * 16 * 128) / (16 * 128)
+    noises = [
+        rng.standard_normal(128) + np.sqrt(2.0) * np.sin(np.pi * at[start : start + 128] + phase)
+        for start in range(0, 16 * 128, 128)
+        for phase in (0.4, 3.0)
+    ]
+    logged, named = _logged(noises)
+    runs = [
+        replace(each, file=f"run{i % 2}", repeat_of=f"{i - i % 2}") for i, each in enumerate(named)
+    ]
+    learnt = learnt_noise(_levels(), logged, runs)[CHANNEL]
+    assert 0.8 * LEVEL < learnt.offset / UNSURE < 1.5 * LEVEL
+    whole = [replace(each, file=None) for each in runs]
+    assert learnt_noise(_levels(), logged, whole)[CHANNEL].offset == 0.0
+    # A constant of its own in every piece loses its weight, and a course keeps it.
+    made = projection(learnt, logged[0], CHANNEL, free_zero=False)
+    left = np.stack([np.ones(128), np.sin(2.0 * np.pi * np.arange(128) / 128)])
+    made.out_of(left)
+    assert np.sqrt(np.mean(left**2, axis=1)) == pytest.approx([0.05, np.sqrt(0.5)], abs=0.03)
+
+
+def test_repeated_pieces_without_a_drift_have_no_constants_of_their_own() -> None:
+    rng = np.random.default_rng(9)
+    logged, named = _logged([rng.standard_normal(128) for _ in range(32)])
+    runs = [
+        replace(each, file=f"run{i % 2}", repeat_of=f"{i - i % 2}") for i, each in enumerate(named)
+    ]
+    assert learnt_noise(_levels(), logged, runs)[CHANNEL].offset == 0.0
 
 
 @pytest.mark.parametrize("turns", [0.7, 1.5, 2.2])
