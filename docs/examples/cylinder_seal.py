@@ -64,6 +64,7 @@ with TemporaryDirectory() as made:
 
 # %% Half the loop of force over position is the friction, at each pressure.
 print(diagnosis.sentence)
+assert [each.name for each in diagnosis.effects] == ["contact_friction", "pressure_friction"]
 friction = diagnosis.model.parameters["contact_friction"].force
 slope = diagnosis.model.parameters["pressure_friction"].slope
 for bar, by_hand in ((1.0, 3.9), (3.0, 5.4), (7.0, 7.2)):

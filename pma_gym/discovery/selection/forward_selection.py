@@ -10,6 +10,7 @@ when all effects are selected: before, an autoregression would take the next eff
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
 from pma_gym.discovery.fitting.covariance import covariance
@@ -36,6 +37,9 @@ from pma_gym.discovery.selection.tried_candidates import Progress
 SECOND_SHARE, SURE_SHARE = 0.12, 0.02
 """Least share of the first effect's gain that another must bring: what a law of the catalogue
 misses of its real likeness is of that order; and the same where the residual is surely no noise."""
+
+LEAST_GAIN = 30.0
+"""Least chi-square that an effect brings."""
 
 BEGINNINGS = 3
 """How often the selection begins anew from a better refitted model."""
@@ -174,7 +178,8 @@ def _with_added(
         stages.append(stage)
         added = _likeliest(stage, stages[0])
         if added is None:
-            other = instead_of_term(problem, best, chosen, rest, seed, journal, progress)
+            worth = partial(_is_worth, stages[0])
+            other = instead_of_term(problem, best, chosen, rest, seed, journal, progress, worth)
             if other is not None:
                 stages[-1], chosen, best = other
             break
@@ -209,11 +214,15 @@ def _likeliest(stage: Stage, first: Stage) -> str | None:
         return None
     name = min(worth, key=lambda each: cost(worth[each]))
     gain = stage.before.chi_square - stage.fits[name].chi_square
-    if gain < 30.0:
-        return None
-    if stage is not first and not carries_the_rest(stage.problem, stage.before, gain):
-        least = min(first.fits.values(), key=cost)
-        share = SURE_SHARE if stage.missing else SECOND_SHARE
-        if gain < share * first.scale * (first.before.chi_square - least.chi_square):
-            return None
-    return name
+    return name if _is_worth(first, stage, gain) else None
+
+
+def _is_worth(first: Stage, stage: Stage, gain: float) -> bool:
+    """Whether an effect brings enough chi-square in a round to be added, beside the first one's."""
+    if gain < LEAST_GAIN:
+        return False
+    if stage is first or carries_the_rest(stage.problem, stage.before, gain):
+        return True
+    least = min(first.fits.values(), key=cost)
+    share = SURE_SHARE if stage.missing else SECOND_SHARE
+    return gain >= share * first.scale * (first.before.chi_square - least.chi_square)

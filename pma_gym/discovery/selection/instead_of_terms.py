@@ -5,7 +5,7 @@ whole law sees nothing left. So where the search ends, looks are taken beside th
 term too.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
 from pma_gym.discovery.fitting.fit_problem import FitProblem, Fitted
@@ -24,6 +24,7 @@ def instead_of_term(
     seed: int,
     journal: Journal,
     progress: Progress,
+    is_worth: Callable[[Stage, float], bool],
 ) -> tuple[Stage, Chosen, Fitted] | None:
     """An effect that explains more beside a law without its term than the term does.
 
@@ -35,9 +36,10 @@ def instead_of_term(
         seed: of simulated residuals.
         journal: keeps fits.
         progress: called with a step's name, what is done and the total.
+        is_worth: whether an effect is worth adding in a round, by what it brings of chi-square.
     Returns:
         The round beside the law without its term, the effects and their fit; None where no effect
-        has a term, or nothing explains more.
+        has a term, or nothing that is worth it explains more.
     """
     state, least, best = Nested(chosen, fit, {}), cost(fit), None
     known = {candidate.name: candidate for candidate in rest}
@@ -48,7 +50,8 @@ def instead_of_term(
                 continue
             stage = stage_of(problem, simpler.fit, simpler.chosen, rest, seed, journal, progress)
             for name, other in stage.fits.items():
-                if cost(other) < least:
+                gain = stage.before.chi_square - other.chi_square
+                if cost(other) < least and is_worth(stage, gain):
                     new = stage.scanned.get(name, known[name])
                     least, best = cost(other), (stage, new, other)
     if best is None:
