@@ -16,6 +16,7 @@ from pma_gym.discovery.report.figure_text import (
     percent,
     signal_name,
     signal_unit,
+    told_apart,
 )
 from pma_gym.discovery.report.noise_text import nuisance_text
 from pma_gym.discovery.report.size_text import sized_effects
@@ -171,7 +172,8 @@ def _change_of(diagnosis: Diagnosis):  # noqa: ANN202
     def words(path: str) -> str:
         moved = diagnosis.parameters[path]
         limit = at_its_limit(moved.now)
-        return f"{path} {moved.now.value:.4g}{limit} instead of {moved.start:.4g}"
+        now, start = told_apart(moved.now.value, moved.start)
+        return f"{path} {now}{limit} instead of {start}"
 
     return words
 
