@@ -109,7 +109,7 @@ def _frequency(
     return float(near[np.argmax([power(hertz) for hertz in near])])
 
 
-def is_told(hertz: float, rate: float, beside: float) -> bool:
+def is_detectable(hertz: float, rate: float, beside: float) -> bool:
     """Whether a line's alias lies above what commands excite, and below half the rate.
 
     Args:
@@ -136,7 +136,7 @@ def _line(hertz: float, logged: Sequence[Logged], parts: Sequence[Array]) -> tup
             continue
         # Rows without a reading, which commands need, say nothing of how often one is taken.
         rate = 1.0 / float(np.median(np.diff(trial.time[np.isfinite(part)])))
-        if not is_told(hertz, rate, 1.0 / float(trial.time[-1] - trial.time[0])):
+        if not is_detectable(hertz, rate, 1.0 / float(trial.time[-1] - trial.time[0])):
             return 0.0, 1.0
         # In a long trial the net's own frequency is looked for, and as long beside it.
         near = _near(hertz, float(trial.time[-1] - trial.time[0]))

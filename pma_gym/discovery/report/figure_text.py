@@ -57,10 +57,10 @@ def figure(value: float | None, digits: int = 3) -> str:
     return f"{float(text):.0f}" if "e+" in text and abs(value) < 1e6 else text
 
 
-def told_apart(one: float, other: float) -> tuple[str, str]:
-    """Two numbers with four significant digits, or as many more as tell one from the other.
+def distinct(one: float, other: float) -> tuple[str, str]:
+    """Two numbers with four significant digits, or as many more as it takes to differ.
 
-    >>> told_apart(1.2013, 1.175), told_apart(4.99997, 5.0), told_apart(5.0, 5.0)
+    >>> distinct(1.2013, 1.175), distinct(4.99997, 5.0), distinct(5.0, 5.0)
     (('1.201', '1.175'), ('4.99997', '5'), ('5', '5'))
     """
     digits = next((n for n in range(4, 17) if f"{one:.{n}g}" != f"{other:.{n}g}"), 4)

@@ -11,12 +11,12 @@ from pma_gym.discovery.report.effect_text import effect_name, effect_names
 from pma_gym.discovery.report.figure_text import (
     at_its_limit,
     chance,
+    distinct,
     figure,
     listed,
     percent,
     signal_name,
     signal_unit,
-    told_apart,
 )
 from pma_gym.discovery.report.noise_text import nuisance_text
 from pma_gym.discovery.report.size_text import sized_effects
@@ -172,7 +172,7 @@ def _change_of(diagnosis: Diagnosis):  # noqa: ANN202
     def words(path: str) -> str:
         moved = diagnosis.parameters[path]
         limit = at_its_limit(moved.now)
-        now, start = told_apart(moved.now.value, moved.start)
+        now, start = distinct(moved.now.value, moved.start)
         return f"{path} {now}{limit} instead of {start}"
 
     return words

@@ -39,7 +39,7 @@ SECOND_SHARE, SURE_SHARE = 0.12, 0.02
 misses of its real likeness is of that order; and the same where the residual is surely no noise."""
 
 LEAST_GAIN = 30.0
-"""Least chi-square that an effect brings."""
+"""Least fall of chi-square by an effect that is added. An assumption."""
 
 BEGINNINGS = 3
 """How often the selection begins anew from a better refitted model."""

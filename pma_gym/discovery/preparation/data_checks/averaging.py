@@ -4,9 +4,9 @@ What a diagnosis costs grows with its rows. Readings are averaged over blocks of
 falls. The average is a parabola's value at the block's middle (Savitzky and Golay), since a plain
 mean cuts the corners of a course, which a fit takes for physics. The price is that it passes 0.8 of
 a wave as long as a block, which folds to a slow one: 60 Hz to 2.5 Hz where 1 kHz is averaged over
-16 rows. A block is therefore as long as keeps the lines of mains from folding to where they are
-not looked for. A block whose readings jump has no value, and none is given: friction that turns
-round is a step. Commands keep every row that joining the others would miss.
+16 rows. Lines of mains are not looked for there, so blocks are as long as keeps them from folding
+to it, where a length does. A block whose readings jump has no value, and none is given: friction
+that turns round is a step. Commands keep every row that joining the others would miss.
 """
 
 import math
@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from pma_gym.data.datasets.dataset import NamedTrial
 from pma_gym.data.trial import Trial
-from pma_gym.discovery.preparation.mains_lines import HARMONICS, MAINS_HZ, is_told
+from pma_gym.discovery.preparation.mains_lines import HARMONICS, MAINS_HZ, is_detectable
 from pma_gym.discovery.preparation.noise import level_of_neighbours
 
 Array = NDArray[np.float64]
@@ -33,10 +33,11 @@ SLOWEST_HZ = 60.0
 """Least rate that is left: slower would hide the rotor's oscillation on the cable."""
 
 PASSES = 0.2
-"""Largest share of a line of mains that may be left where it is not told."""
+"""Largest share of a line of mains that averages may leave where it is not looked for, if any block
+keeps to it. An assumption."""
 
 NYQUIST_HZ = 1.0
-"""How near to half the rate that is left a line may lie."""
+"""How near to half the rate that is left a line may lie. An assumption."""
 
 PARABOLA = 4
 """Fewest readings that a parabola is drawn through."""
@@ -104,13 +105,13 @@ def _factor(rate: float, wanted: int) -> int:
     """Rows of a block: as wanted, or as many fewer (to half) as the lines of mains ask for."""
     most = max(1, min(wanted, int(rate / SLOWEST_HZ)))
     tried = range(most, most // 2, -1)
-    passed = [_untold(rate, factor) for factor in tried]
+    passed = [_undetectable(rate, factor) for factor in tried]
     clear = [factor for factor, share in zip(tried, passed, strict=True) if share <= PASSES]
     return clear[0] if clear else tried[int(np.argmin(passed))]
 
 
-def _untold(rate: float, factor: int) -> float:
-    """Largest share of a line of mains that averages leave where it is told from nothing else.
+def _undetectable(rate: float, factor: int) -> float:
+    """Largest share of a line of mains that averages leave where it is not looked for.
 
     Args:
         rate: rows a second (Hz).
@@ -120,7 +121,8 @@ def _untold(rate: float, factor: int) -> float:
     lines = [mains * harmonic for mains in MAINS_HZ for harmonic in HARMONICS]
     return max(
         abs(float(_weights(factor) @ np.cos(2.0 * np.pi * hertz * at)))
-        if is_told(hertz, rate, NYQUIST_HZ) and not is_told(hertz, rate / factor, NYQUIST_HZ)
+        if is_detectable(hertz, rate, NYQUIST_HZ)
+        and not is_detectable(hertz, rate / factor, NYQUIST_HZ)
         else 0.0
         for hertz in lines
     )
