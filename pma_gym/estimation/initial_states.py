@@ -71,49 +71,95 @@ class Correction(NamedTuple):
     rough: bool
 
 
-def meet(states: Array, held: Array, logged: Logged, levels: Array, further: int) -> Correction:
+def meet(
+    states: Sequence[Array],
+    held: Sequence[Sequence[Array]],
+    trials: Sequence[Logged],
+    levels: Array,
+    further: int,
+) -> list[Correction]:
     """Correct simulations for their initial states, so that they fit the measurements.
 
     Args:
-        states: of all simulations, the last of which are the first with another start each, shape
-            (tried + further, rows, states); the others are changed in place.
-        held: what the sensors hold in them (SI), shape (tried + further, signals, rows).
-        logged: what was measured.
+        states: of all simulations of each trial, the last of which are the first with another start
+            each, shape (tried + further, rows, states); the others are changed in place.
+        held: what the sensors hold in them (SI), shape (tried + further, rows) each, by trial and
+            signal.
+        trials: what was measured.
         levels: standard deviations of the signals (SI), shape (signals,).
         further: how many other starts there are.
     """
-    along, off = [], []
-    measured = [channel for channel, known in enumerate(logged.measures) if known]
-    for channel in measured:
-        there = _there(logged, channel)
-        # One signal has no weight beside another.
-        weight = levels[measured[0]] / levels[channel]
-        change = weight * (held[-further:, channel, there] - held[0, channel, there])
-        if logged.signals[channel].has_free_zero:
-            change = change - change.mean(axis=1, keepdims=True)
-        along.append(change)
-        off.append(weight * (logged.measured[channel, there] - held[:-further, channel, there]))
-    moves = np.concatenate(along, axis=1)
-    # A simulation that runs away has no finite sizes; it stays as it is.
-    with np.errstate(over="ignore", invalid="ignore"):
-        sizes = moves @ moves.T
-    if not np.isfinite(sizes).all() or not sizes.any():
-        return Correction(np.zeros(further), np.inf, False)
+    sought = [
+        _Sought.of(signals, logged, levels, further)
+        for signals, logged in zip(held, trials, strict=True)
+    ]
+    known = [each for each in sought if np.isfinite(each.sizes).all() and each.sizes.any()]
     # What one start does as well as the other is shared between them.
-    wanted = np.concatenate(off, axis=1)
-    shares = wanted @ moves.T @ np.linalg.pinv(sizes, hermitian=True)
+    sizes = np.array([each.sizes for each in known]).reshape(-1, further, further)
+    inverses = np.linalg.pinv(sizes, hermitian=True)
+    by_trial = dict(zip(map(id, known), inverses, strict=True))
+    return [
+        _corrected(space, logged, each, float(levels[logged.channels[0]]), by_trial.get(id(each)))
+        for space, logged, each in zip(states, trials, sought, strict=True)
+    ]
+
+
+class _Sought(NamedTuple):
+    """What a correction of one trial has to explain, in units of its first signal's noise.
+
+    Attributes:
+        moves: what each other start does to the readings, shape (further, readings).
+        first: the same for the first signal alone.
+        wanted: measured less simulated, shape (tried, readings).
+        sizes: products of the moves, shape (further, further).
+    """
+
+    moves: Array
+    first: Array
+    wanted: Array
+    sizes: Array
+
+    @classmethod
+    def of(cls, held: Sequence[Array], logged: Logged, levels: Array, further: int) -> "_Sought":
+        along, off = [], []
+        for channel in logged.channels:
+            there = logged.there[channel]
+            # One signal has no weight beside another.
+            weight = levels[logged.channels[0]] / levels[channel]
+            read = held[channel][:, there]
+            change = weight * (read[-further:] - read[0])
+            if logged.signals[channel].has_free_zero:
+                change = change - change.mean(axis=1, keepdims=True)
+            along.append(change)
+            off.append(weight * (logged.measured[channel, there] - read[:-further]))
+        one = len(along) == 1
+        moves = along[0] if one else np.concatenate(along, axis=1)
+        wanted = off[0] if one else np.concatenate(off, axis=1)
+        # A simulation that runs away has no finite sizes; it stays as it is.
+        with np.errstate(over="ignore", invalid="ignore"):
+            return cls(moves, along[0], wanted, moves @ moves.T)
+
+
+def _corrected(
+    states: Array, logged: Logged, sought: _Sought, level: float, inverse: Array | None
+) -> Correction:
+    """The correction of one trial, made in its states; none where `inverse` is None."""
+    moves, first, wanted, _ = sought
+    further = len(moves)
+    if inverse is None:
+        return Correction(np.zeros(further), np.inf, False)
+    shares = wanted @ moves.T @ inverse
     for share, moved in zip(shares.T, states[-further:] - states[0], strict=True):
         states[:-further] += share[:, None, None] * moved
-    first = measured[0]
-    span = float(np.ptp(logged.measured[first, _there(logged, first)]))
-    most = float(np.abs(shares[0] @ along[0]).max())
-    bends = math.isfinite(most) and most**2 > BENDS * float(levels[first]) * span
-    misfit, rest = float(wanted[0] @ wanted[0]), wanted[0] - shares[0] @ moves
-    rough = (
-        bends
-        and bool(logged.time[-1] - logged.time[0] > BENDING_S)
-        and float(rest @ rest) < LEAVES * misfit
-    )
+    misfit = float(wanted[0] @ wanted[0])
+    rough = False
+    if logged.time[-1] - logged.time[0] > BENDING_S:
+        at = logged.channels[0]
+        span = float(np.ptp(logged.measured[at, logged.there[at]]))
+        most = float(np.abs(shares[0] @ first).max())
+        rest = wanted[0] - shares[0] @ moves
+        bends = math.isfinite(most) and most**2 > BENDS * level * span
+        rough = bends and float(rest @ rest) < LEAVES * misfit
     return Correction(shares[0], misfit, rough)
 
 
@@ -147,7 +193,7 @@ def _start(logged: Logged) -> tuple[float, float]:
 
 def _first(logged: Logged, channel: int) -> tuple[float, float]:
     """A signal and its rate (SI) where a trial begins, by a parabola through its first readings."""
-    there = np.flatnonzero(_there(logged, channel))
+    there = np.arange(len(logged.time))[logged.there[channel]]
     if len(there) < 3:
         return 0.0, 0.0
     time, values = logged.time[there] - logged.time[0], logged.measured[channel, there]
@@ -155,9 +201,3 @@ def _first(logged: Logged, channel: int) -> tuple[float, float]:
     order = 2 if min(count, len(there)) > 3 else 1
     fitted = np.polynomial.Polynomial.fit(time[:count], values[:count], order)
     return float(fitted(0.0)), float(fitted.deriv()(0.0))
-
-
-def _there(logged: Logged, channel: int) -> NDArray[np.bool_]:
-    there = np.ones(len(logged.time), bool)
-    there[logged.missing[channel]] = False
-    return there

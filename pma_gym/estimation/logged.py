@@ -1,6 +1,7 @@
 """Measured trials in the form that a fit needs."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -88,6 +89,23 @@ class Logged:
             if signal.measures in measures:
                 return channel
         return None
+
+    @cached_property
+    def channels(self) -> list[int]:
+        """Which signals have a reading that counts."""
+        return [channel for channel, known in enumerate(self.measures) if known]
+
+    @cached_property
+    def there(self) -> list[slice | NDArray[np.bool_]]:
+        """Rows with a reading that counts, by output."""
+        return [self._there(channel) for channel in range(len(self.signals))]
+
+    def _there(self, channel: int) -> slice | NDArray[np.bool_]:
+        if not self.missing[channel].size:
+            return slice(None)
+        there = np.ones(len(self.time), bool)
+        there[self.missing[channel]] = False
+        return there
 
     @property
     def first(self) -> tuple[float, float]:

@@ -123,7 +123,7 @@ class Residuals(SimulatedTrials):
 
         Shape (1 + p, signals, rows).
         """
-        held = self._held(states, zeros, vectors)
+        held = self._held(states, zeros, vectors, logged.channels)
         count, rows = len(states), len(logged.time)
         moved = (count - 1) // 2 if central else count - 1
         differences = np.zeros((1 + moved, len(self.plant.outputs), rows))
@@ -153,8 +153,8 @@ class Residuals(SimulatedTrials):
         trials = []
         for number, states, zero in zip(block, spaces, zeros, strict=True):
             logged, weights = self._trials[number], self._weights[number]
-            channels = [i for i, known in enumerate(logged.measures) if known]
-            held = self._held(states, zero, vectors)
+            channels = logged.channels
+            held = self._held(states, zero, vectors, logged.channels)
             trials.append(
                 Signals(
                     [held[i] for i in channels],

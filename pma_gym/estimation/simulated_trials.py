@@ -24,8 +24,8 @@ from pma_gym.plant.compiled_model import DEFAULT_TOLERANCE
 from pma_gym.plant.equilibrium import solver
 from pma_gym.plant.model import Model
 from pma_gym.plant.plant import Plant
-from pma_gym.plant.program import FIRST_S, table
-from pma_gym.plant.simulation import Run, simulate_all
+from pma_gym.plant.program import table
+from pma_gym.plant.simulation import Batch, simulate_batches
 
 Array = NDArray[np.float64]
 
@@ -150,17 +150,14 @@ class SimulatedTrials:
             return results
         states, zeros = states.reshape(*shape, number), zeros.reshape(shape)
         for block in self._blocks(8 * number * count):
-            runs, spaces = [], self._spaces(block, count)
-            for i, space in zip(block, spaces, strict=True):
-                runs += self._runs(i, tables[i], states[i], zeros[i], space)
-            simulate_all(self.plant.program, runs, self.threads)
+            spaces = self._spaces(block, count)
+            batches = [
+                self._batch(i, tables[i], states[i], zeros[i], space)
+                for i, space in zip(block, spaces, strict=True)
+            ]
+            simulate_batches(self.plant.program, batches, self.threads)
             if self._begun:
-                rows = [slice(i * count, (i + 1) * count) for i in block]
-                each = zip(block, spaces, rows, strict=True)
-                spaces = [
-                    self._met_freely(i, space, zeros[i], vectors, every[of], tables[i])
-                    for i, space, of in each
-                ]
+                spaces = self._met_freely(block, spaces, zeros, vectors, every, tables)
             elif moved:
                 each = zip(block, spaces, strict=True)
                 spaces = [self._met(i, space, zeros[i], vectors) for i, space in each]
@@ -190,7 +187,7 @@ class SimulatedTrials:
     def _start_shares(self, number: int, space: Array, zeros: Array, vectors: Array) -> Array:
         """Multiple of the move that brings each simulation nearest to the readings, (tried,)."""
         logged = self._trials[number]
-        held = self._held(space, zeros, np.concatenate([vectors, vectors[:1]]))
+        held = self._held(space, zeros, np.concatenate([vectors, vectors[:1]]), logged.channels)
         left = np.stack(held, axis=1) - logged.measured
         changes = self._in_noise(logged, left * logged.counts)
         along = changes[-1] - changes[0]
@@ -202,58 +199,93 @@ class SimulatedTrials:
 
     def _met_freely(
         self,
-        number: int,
-        space: Array,
+        block: list[int],
+        spaces: list[Array],
         zeros: Array,
         vectors: Array,
         every: Array,
-        tables: list[Array],
-    ) -> Array:
-        """States of a free rig's trial, begun as fits best; shape (tried, rows, states).
+        tables: Sequence[Array],
+    ) -> list[Array]:
+        """States of a free rig's trials, begun as fits best; shape (tried, rows, states) each.
+
+        Args:
+            block: the trials.
+            spaces: their states, with other starts in the last ones.
+            zeros: x0 in each simulation of every trial.
+            vectors: parameters that were tried.
+            every: parameters of every trial in each simulation, its start among them.
+            tables: of every trial.
+        """
+        count, tried, levels = zeros.shape[1], len(vectors), self._levels
+        further = count - tried
+        last = np.concatenate([vectors, *([vectors[:1]] * further)])
+        logs = [self._trials[i] for i in block]
+        held = [
+            self._held(space, zeros[i], last, logged.channels)
+            for i, logged, space in zip(block, logs, spaces, strict=True)
+        ]
+        corrections = initial_states.meet(spaces, held, logs, levels, further)
+        for i, space, correction in zip(block, spaces, corrections, strict=True):
+            if correction.rough:
+                of = slice(i * count, (i + 1) * count)
+                self._begun_again(i, space, zeros[i], last, every[of], tables[i], correction)
+        position = self.plant.model.rig.signals[0]
+        if position.has_free_zero and f"{SENSOR_DELAY}{position.name}" in self._ports:
+            for logged, space in zip(logs, spaces, strict=True):
+                column = self.plant.sensor_columns[0]
+                initial_states.put_zero(space[:tried, :, column], logged)
+        return [space[:tried] for space in spaces]
+
+    def _begun_again(
+        self,
+        number: int,
+        space: Array,
+        zeros: Array,
+        last: Array,
+        every: Array,
+        tables: Array,
+        met: initial_states.Correction,
+    ) -> None:
+        """Begin a trial again from where it was corrected to, until its equations hardly bend.
 
         Args:
             number: of the trial.
-            space: its states, with other starts in the last ones.
+            space: its states, with other starts in the last ones; changed in place.
             zeros: x0 of each.
-            vectors: parameters that were tried.
-            every: parameters of the trial in each simulation, its start among them.
+            last: parameters of each simulation, less what the trial has of its own.
+            every: those with it.
             tables: of each simulation.
+            met: the first correction.
         """
-        tried, further, logged = len(vectors), len(space) - len(vectors), self._trials[number]
-        last = np.concatenate([vectors, *([vectors[:1]] * further)])
-        before, least = space[:0], np.inf
-        for restart in range(initial_states.RESTARTS + 1):
-            held = np.stack(self._held(space, zeros, last), axis=1)
-            met = initial_states.meet(space, held, logged, self._levels, further)
-            if restart and not met.misfit < least:
-                # Where dry friction sticks, no move of the start tells what the next one does.
-                space[:tried] = before
-                break
-            if not met.rough or restart == initial_states.RESTARTS:
-                break
-            before, least = space[:tried].copy(), met.misfit
+        logged, further = self._trials[number], len(met.moves)
+        tried = len(space) - further
+        for _ in range(initial_states.RESTARTS):
+            before = space[:tried].copy()
             for (place, _), move in zip(self._begun[-further:], met.moves.tolist(), strict=True):
                 every[:, place] += initial_states.MOVE * move
             first = np.repeat([logged.first], len(space), axis=0).T
             states, zeros[:] = solver.equilibria_at(self.plant, first[0], first[1], every)
-            simulate_all(
-                self.plant.program, self._runs(number, tables, states, zeros, space), self.threads
-            )
-        position = self.plant.model.rig.signals[0]
-        if position.has_free_zero and f"{SENSOR_DELAY}{position.name}" in self._ports:
-            initial_states.put_zero(space[:tried, :, self.plant.sensor_columns[0]], logged)
-        return space[:tried]
+            batch = self._batch(number, tables, states, zeros, space)
+            simulate_batches(self.plant.program, [batch], self.threads)
+            held, least = self._held(space, zeros, last, logged.channels), met.misfit
+            (met,) = initial_states.meet([space], [held], [logged], self._levels, further)
+            if not met.misfit < least:
+                # Where dry friction sticks, no move of the start tells what the next one does.
+                space[:tried] = before
+                return
+            if not met.rough:
+                return
 
-    def _runs(
-        self, number: int, tables: list[Array], states: Array, zeros: Array, space: Array
-    ) -> list[Run]:
+    def _batch(
+        self, number: int, tables: Array, states: Array, zeros: Array, space: Array
+    ) -> Batch:
         """Simulations of a trial from states, with tables and x0 of each, into `space`."""
         logged = self._trials[number]
-        columns = (logged.time, logged.motor, logged.regulator, self.interpolation)
-        return [
-            Run(*columns, tables[k], states[k], zeros[k], FIRST_S, space[k])
-            for k in range(len(space))
-        ]
+        time, motor, regulator = (
+            np.ascontiguousarray(column, float)
+            for column in (logged.time, logged.motor, logged.regulator)
+        )
+        return Batch(time, motor, regulator, self.interpolation, tables, states, zeros, space)
 
     @property
     def _levels(self) -> Array:
@@ -267,13 +299,13 @@ class SimulatedTrials:
             every[:, place] = np.repeat(values, len(vectors))
         return every
 
-    def _tables(self, every: Array, count: int) -> list[list[Array]]:
+    def _tables(self, every: Array, count: int) -> Sequence[Array]:
         """Tables of every trial; the same ones where trials have no parameters of their own."""
-        program = self.plant.program
+        program, trials = self.plant.program, len(self._trials)
         if not self._own:
-            return [[table(program, vector) for vector in every[:count]]] * len(self._trials)
-        parts = np.split(every, len(self._trials))
-        return [[table(program, vector) for vector in part] for part in parts]
+            return [np.stack([table(program, vector) for vector in every[:count]])] * trials
+        tables = np.stack([table(program, vector) for vector in every])
+        return list(tables.reshape(trials, count, -1))
 
     def _indices(self, own: Mapping[str, Sequence[float]]) -> list[tuple[int, Array]]:
         """Where values (SI) go that a parameter has in each trial, by its path."""
@@ -301,12 +333,35 @@ class SimulatedTrials:
         parts = np.split(self._buffer[: ends[-1]], ends[:-1])
         return [part.reshape(shape) for part, shape in zip(parts, shapes, strict=True)]
 
-    def _held(self, states: Array, zeros: Array, vectors: Array) -> list[Array]:
-        """Sensor values, shape (tried, rows) each."""
+    def _held(
+        self, states: Array, zeros: Array, vectors: Array, read: Sequence[int] | None = None
+    ) -> list[Array]:
+        """Sensor values, shape (tried, rows) each.
+
+        Args:
+            states: shape (tried, rows, states), contiguous.
+            zeros: x0 of each.
+            vectors: parameters of each, contiguous.
+            read: which signals are asked for, all if not given; the others are zeros.
+        """
         columns, program = self.plant.sensor_columns, self.plant.program
+        asked = range(len(columns)) if read is None else read
         count, rows, _ = states.shape
-        truth = np.empty((count, rows, len(self.plant.outputs)) if min(columns) < 0 else (0, 0, 0))
-        for i, out in enumerate(truth):
-            addresses = (vectors[i].ctypes.data, out.ctypes.data)
-            program.observe(rows, states[i].ctypes.data, float(zeros[i]), *addresses)
-        return [states[:, :, at] if at >= 0 else truth[:, :, i] for i, at in enumerate(columns)]
+        truth = np.empty((0, 0, 0))
+        if min([columns[at] for at in asked]) < 0:
+            truth = np.empty((count, rows, len(self.plant.outputs)))
+            here, there, of = (each.ctypes.data for each in (states, truth, vectors))
+            for i, zero in enumerate(zeros.tolist()):
+                program.observe(
+                    rows,
+                    here + i * states.strides[0],
+                    zero,
+                    of + i * vectors.strides[0],
+                    there + i * truth.strides[0],
+                )
+        unread = truth if len(asked) == len(columns) else np.zeros((count, rows))
+        held = [unread] * len(columns)
+        for signal in asked:
+            at = columns[signal]
+            held[signal] = states[:, :, at] if at >= 0 else truth[:, :, signal]
+        return held

@@ -93,12 +93,12 @@ class Whitening:
         for lag, share in enumerate(self.coefficients, 1):
             white[..., lag:] -= (share / self.innovation) * series[..., :-lag]
         order = len(self.coefficients)
-        rows = np.arange(series.shape[-1])
-        alone = [rows[:order], *(missing + lag for lag in range(1, order + 1))]
-        alone = np.unique(np.concatenate(alone))
-        alone = alone[alone < len(rows)]
-        white[..., alone] = series[..., alone] / self.level
-        white[..., missing] = 0.0
+        white[..., :order] = series[..., :order] / self.level
+        if missing.size:
+            for lag in range(1, order + 1):
+                alone = missing[missing < series.shape[-1] - lag] + lag
+                white[..., alone] = series[..., alone] / self.level
+            white[..., missing] = 0.0
         return white
 
 

@@ -110,6 +110,7 @@ class WhitenedResiduals(Residuals):
         self.lower, self.upper = assumed_range(self.centre, self.prior, *self._possible, wider)
         self._own = self._indices(own or {})
         self._projections: dict[tuple[int, int], Projection] = {}
+        self._constants: dict[tuple[int, int], tuple[Array, float]] = {}
 
     @property
     def _levels(self) -> Array:
@@ -224,12 +225,18 @@ class WhitenedResiduals(Residuals):
             if noise.has_nuisances:
                 self._projection(logged, channel).out_of(filtered)
             elif signal.has_free_zero:
-                one = np.ones(len(logged.time))
-                one[missing] = 0.0
-                along = noise.white(one[None], missing)[0]
-                filtered -= np.outer(filtered @ along / (along @ along), along)
+                along, size = self._constant(logged, channel)
+                filtered -= np.outer(filtered @ along / size, along)
             white[:, channel] = filtered
         return white
+
+    def _constant(self, logged: Logged, channel: int) -> tuple[Array, float]:
+        """What a constant is when it is whitened, shape (rows,), and its square; made once."""
+        key = (id(logged), channel)
+        if key not in self._constants:
+            along = self.noise[channel].white(logged.counts[channel], logged.missing[channel])
+            self._constants[key] = along, float(along @ along)
+        return self._constants[key]
 
     def without_nuisances(self, logged: Logged, left: Array) -> Array:
         """Simulated less measured (SI), NaN where there is none, less lines and drifts in it.

@@ -22,7 +22,14 @@ from pma_gym.discovery.fitting.held_out import held_out_misfit
 from pma_gym.discovery.result.estimates import Undetermined
 from pma_gym.discovery.selection.candidate_fits import cost
 from pma_gym.discovery.selection.profile_limits import limits
-from pma_gym.discovery.selection.tied_laws import Chosen, Nested, fit_held, fit_tied, simpler_laws
+from pma_gym.discovery.selection.tied_laws import (
+    Chosen,
+    Nested,
+    below_twin,
+    fit_held,
+    fit_tied,
+    simpler_laws,
+)
 
 FLAT = 4.0
 """Chi-square by which a profile may rise and still be flat: twice a log-likelihood of 2."""
@@ -123,7 +130,7 @@ def _tied(problem: FitProblem, state: Nested, place: int) -> Nested | None:
         # What the whole law explains more must be worth its parameters, as anywhere.
         if simpler is not None and (
             cost(simpler.fit) < cost(state.fit)
-            or (tie.twin and state.fit.estimate(tie.path)[0] < state.fit.estimate(tie.twin)[0])
+            or below_twin(state.fit, tie)
             or _ended(problem, state, tie.path)
             or not _asked_for(problem, state, simpler)
         ):

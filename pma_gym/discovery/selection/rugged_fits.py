@@ -27,6 +27,7 @@ from pma_gym.discovery.selection.tied_laws import (
     Chosen,
     Nested,
     Tie,
+    below_twin,
     fit_held,
     idle_values,
     ties,
@@ -39,18 +40,22 @@ TIED, NEAR = 4, 0.02
 the share by which both may differ in the end."""
 
 STARTS = (
-    (1.1, 0.2),
     (1.1, 0.5),
+    (1.25, 1.0),
+    (1.4, 2.0),
+    (1.1, 0.2),
     (1.1, 1.0),
     (1.1, 2.0),
     (1.25, 0.5),
-    (1.25, 1.0),
     (1.4, 0.5),
     (1.4, 1.0),
-    (1.4, 2.0),
 )
 """How many times as large as its twin a parameter begins that the simpler law ties to it, and at
 which share of its usual value what does nothing in the simpler law."""
+
+FIRST, WORTH = 3, 0.05
+"""How many of them are tried first, and the share of the simpler law's chi-square that they must
+gain for the others to be tried: where the whole law explains no more, its optima do not matter."""
 
 FITTED, REFINED = 4, 2
 """How many of the fits to short pieces are fitted to the trials, and how many are refined."""
@@ -115,11 +120,15 @@ def settled(problem: FitProblem, fit: Fitted, chosen: Chosen) -> Fitted:
 
     A fit that leaves little more than the noise is not begun anew: others hardly leave less.
 
+    Nor is a law refined that the simpler one takes the place of anyway (`nested_laws`).
+
     Args:
         problem: the trials, with the noise that the fit leaves.
         fit: the fit; its spread is kept.
         chosen: the effects in it.
     """
+    if all(below_twin(fit, tie) for candidate in chosen for tie in ties(candidate)):
+        return fit
     refit = refined(problem, fit, chosen)
     if refit.converged or problem.left(refit) < AT_NOISE:
         return refit
@@ -135,14 +144,17 @@ def _fits_from_simpler_laws(problem: FitProblem, fit: Fitted, chosen: Chosen) ->
             simpler = _simpler(problem, begun, chosen, place, tie)
             if simpler is None:
                 continue
-            left = max(1.0, problem.left(simpler))
-            for start in _starts(candidate, tie, simpler):
+            left, least = max(1.0, problem.left(simpler)), simpler.chi_square
+            for number, start in enumerate(_starts(candidate, tie, simpler)):
+                if number == FIRST and least > (1.0 - WORTH) * simpler.chi_square:
+                    break
                 model = simpler.model.replace(start)
                 smooth = bool(problem.wholes)
                 new = (
                     problem.fit(model, chosen) if smooth else problem.eased_fit(model, chosen, left)
                 )
                 if new is not None:
+                    least = min(least, new.chi_square)
                     yield new
 
 

@@ -54,6 +54,14 @@ class Tie:
     idle: tuple[str, ...]
 
 
+def below_twin(fit: Fitted, tie: Tie) -> bool:
+    """Whether a parameter is below the one that it equals in the simpler law.
+
+    A static friction below the dynamic one borrows the law's form for something else.
+    """
+    return bool(tie.twin) and fit.estimate(tie.path)[0] < fit.estimate(tie.twin)[0]
+
+
 def simpler_laws(candidate: CandidateEffect) -> Iterator[Tie]:
     """The simpler laws of an effect whose parameters are fitted."""
     yield from ties(candidate)
