@@ -12,7 +12,7 @@ from pma_gym.codegen.machine.native import Library, compiled, simd_lanes
 from pma_gym.plant import program as program_module
 from pma_gym.plant.model import load_model
 from pma_gym.plant.plant import Plant
-from pma_gym.plant.simulation import FEW, Run, simulate_all
+from pma_gym.plant.simulation import FEW, Batch, Run, simulate_all, simulate_batches
 
 CHANGES = ("slide.mass_kg", "rotor.inertia_kg_m2", "cable.stiffness_n_per_mm")
 
@@ -51,6 +51,36 @@ def test_many_trials_at_once_have_the_bits_of_each_alone(count, threads):
         assert one.size == other.size
         assert one.states.shape == (len(one.time), len(program.states))
         assert np.all(np.isfinite(one.states))
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+@pytest.mark.parametrize("counts", [(1,), (3,), (1, 1, 2), (5, 12, 1, 20)])
+def test_a_trial_at_many_parameters_has_the_bits_of_its_runs(counts, threads):
+    program = Plant("station").program
+    batches, runs = [], []
+    for k, count in enumerate(counts):
+        given = trials(count)
+        # The second is one row: its states are those that it begins in.
+        columns = [each[: 1 if k == 1 else 20] for each in _columns(20, k)]
+        starts = np.stack([run.state for run in given])
+        zeros = np.array([run.zero_contraction for run in given])
+        tables = np.stack([run.table for run in given])
+        out = np.full((count, len(columns[0]), len(program.states)), np.nan)
+        batches.append(Batch(*columns, "foh", tables, starts, zeros, out))
+        for run in given:
+            alone = Run(*columns, "foh", run.table, run.state, run.zero_contraction)
+            simulate_all(program, [alone])
+            runs.append(alone)
+    simulate_batches(program, batches, threads)
+    together = [states for batch in batches for states in batch.states]
+    for one, other in zip(together, runs, strict=True):
+        np.testing.assert_array_equal(one, other.states)
+
+
+def _columns(rows, seed):
+    generator = np.random.default_rng(seed)
+    motor, regulator = generator.uniform(0.0, 6.0, rows), generator.uniform(4.0, 8.0, rows)
+    return np.cumsum(generator.uniform(0.002, 0.02, rows)), motor, regulator
 
 
 def test_few_passes_of_the_compiler_give_the_bits_of_all(monkeypatch):

@@ -14,13 +14,19 @@ from pma_gym.discovery.preparation.noise import white_noise
 from pma_gym.discovery.preparation.prepared_trials import prepared
 from pma_gym.discovery.screening.candidates import candidate_effects
 from pma_gym.discovery.selection import rugged_fits
-from pma_gym.discovery.selection.rugged_fits import best_of_optima, is_rugged
+from pma_gym.discovery.selection.rugged_fits import (
+    FIRST,
+    STARTS,
+    best_of_optima,
+    is_rugged,
+    settled,
+)
 from pma_gym.plant.model import load_model
 from tests.discovery.rig_trials import FROZEN, driven_slide
 
 MODEL = load_model(FROZEN / "driven_slide" / "model.toml")
 DRY = next(each for each in candidate_effects(MODEL) if each.name == "coulomb_friction")
-DYNAMIC = "coulomb_friction.dynamic_n"
+DYNAMIC, STATIC = "coulomb_friction.dynamic_n", "coulomb_friction.static_n"
 
 
 def problem_of(trials):
@@ -48,6 +54,24 @@ def test_a_fit_that_stops_far_off_is_begun_again_at_the_simpler_law():
     for path, value in zip(best.paths, best.values, strict=True):
         low, high = best.spread[path]
         assert low <= value <= high
+
+
+@pytest.mark.parametrize(("least", "begun"), [(96.0, FIRST), (94.0, len(STARTS))])
+def test_more_beginnings_are_tried_where_the_whole_law_explains_more(least, begun, monkeypatch):
+    """Of a chi-square of 100 that one number leaves, it must explain 5 with the first of them."""
+    problem = problem_of(driven_slide(12.0, lanes=1, seconds=0.3, rate=100))
+    fit = fit_from(problem, 14.0, 12.0, 5.0)
+    left = iter([98.0, least, *([99.0] * len(STARTS))])
+    monkeypatch.setattr(rugged_fits, "_simpler", lambda *_: replace(fit, chi_square=100.0))
+    monkeypatch.setattr(FitProblem, "eased_fit", lambda *_: replace(fit, chi_square=next(left)))
+    assert len(list(rugged_fits._fits_from_simpler_laws(problem, fit, (DRY,)))) == begun
+
+
+def test_a_law_that_one_number_takes_the_place_of_is_not_refined():
+    problem = problem_of(driven_slide(12.0, lanes=2, seconds=0.5, rate=100))
+    fit = fit_from(problem, 14.0, 12.0, 10.0)
+    below = replace(fit, values=np.where(np.array(fit.paths) == STATIC, 3.0, fit.values))
+    assert settled(problem, below, (DRY,)) is below
 
 
 def test_a_refined_fit_explains_more_and_says_what_it_explains():
