@@ -285,10 +285,11 @@ def _left(truth: Mapping[str, Any], answer: Mapping[str, Any]) -> float | None:
 
 def _sizes(outcome: Outcome, truth: Mapping[str, Any], effects: list[Mapping[str, Any]]) -> None:
     parameters = {effect["name"]: effect["parameters"] for effect in effects}
+    hidden = {effect["name"]: effect["parameters"] for effect in truth["effects"]}
     for effect in truth["effects"]:
         if truth["block"] == "rigs":
             kind = truth["rig"].get("kind", "imposed")
-            values = sizes.expected(kind, effect["name"], effect["parameters"])
+            values = sizes.expected(kind, effect["name"], effect["parameters"], hidden)
         else:
             values = expected(effect["name"], effect["parameters"])
         for name, value in values.items():

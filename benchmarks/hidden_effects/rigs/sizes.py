@@ -39,14 +39,23 @@ TURNED = {("imposed", "directional_damping")}
 """Effects with a direction on rigs whose file counts positions the other way round."""
 
 
-def expected(kind: str, name: str, hidden: Values) -> dict[str, float]:
+def expected(
+    kind: str, name: str, hidden: Values, beside: Mapping[str, Values] | None = None
+) -> dict[str, float]:
     """Values in file units, by the catalogue's parameter, that describe a hidden effect.
+
+    The catalogue's friction by pressure has none without pressure; what the hidden law has there
+    adds to the friction of a contact.
 
     Args:
         kind: of the rig.
         name: the catalogue's name of the effect; one that it lacks has no values.
         hidden: parameters of the hidden law (SI).
+        beside: those of all that is hidden, by the catalogue's name.
     """
+    if name == "contact_friction" and "pressure_friction" in (beside or {}):
+        assert beside is not None
+        return {"force_n": hidden["size"] + beside["pressure_friction"]["size"]}
     if name in OTHERWISE:
         return OTHERWISE[name](hidden)
     if name not in KEYS:

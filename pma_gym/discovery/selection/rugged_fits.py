@@ -118,9 +118,8 @@ def _interval(problem: FitProblem, fit: Fitted, chosen: Chosen) -> tuple[Array, 
 def settled(problem: FitProblem, fit: Fitted, chosen: Chosen) -> Fitted:
     """A fit near an optimum, refined; or the best of more optima where that does not converge.
 
-    A fit that leaves little more than the noise is not begun anew: others hardly leave less.
-
-    Nor is a law refined that the simpler one takes the place of anyway (`nested_laws`).
+    A fit that leaves little more than the noise is not begun anew: others hardly leave less. Nor is
+    a law refined that the simpler one takes the place of anyway (`nested_laws`).
 
     Args:
         problem: the trials, with the noise that the fit leaves.

@@ -14,7 +14,7 @@ from benchmarks.hidden_effects.generation.undecidable import BLOCKS
 from benchmarks.hidden_effects.rigs import drawing, effect_size, files
 from benchmarks.hidden_effects.rigs.driven_campaign import draw_driven
 from benchmarks.hidden_effects.rigs.lab_names import GERMAN, METRES, OURS
-from benchmarks.hidden_effects.rigs.laws import ConstantForce
+from benchmarks.hidden_effects.rigs.laws import ConstantForce, CoulombFriction, PressureFriction
 from benchmarks.hidden_effects.rigs.offers import KNOWN, OFFERS, catalogue_name, group
 from benchmarks.hidden_effects.rigs.rig import draw_joint, draw_slide
 from benchmarks.hidden_effects.rigs.sizes import expected
@@ -147,6 +147,20 @@ def test_what_is_hidden_has_its_size_in_the_unit_of_the_catalogue():
             ((key, size),) = expected(kind, name, {"size": 3.0, "slope": 1.0}).items()
             quantity = CATALOGUE[name].quantities[CATALOGUE[name].names_in_files()[key]]
             assert abs(size) == pytest.approx(quantity.from_si(3.0))
+
+
+def test_frictions_of_a_contact_add_up():
+    """At no pressure the hidden friction of a seal is its size; the catalogue's there is none."""
+    contact, seal = {"size": 0.11}, {"size": 0.065, "slope": 2e-6}
+    beside = {"contact_friction": contact, "pressure_friction": seal}
+    both = expected("imposed", "contact_friction", contact, beside)
+    assert both == {"force_n": pytest.approx(0.175)}
+    slope = expected("imposed", "pressure_friction", seal, beside)["slope_n_per_kpa"]
+    kilopascals = 300.0
+    total = both["force_n"] + slope * kilopascals
+    hidden = CoulombFriction(**contact).kinetic(0.0, 0.1, 3e5)
+    hidden += PressureFriction(**seal).kinetic(0.0, 0.1, 3e5)
+    assert total == pytest.approx(hidden)
 
 
 def test_what_cannot_be_hidden_together_is_of_one_group():
