@@ -8,7 +8,8 @@ say that a simpler law of its own sets one parameter equal to another (`Effect.t
 term (`Effect.terms`); the whole law
 stays where it explains more than its further parameters cost, of readings left out too, and where
 the parameter that may be equal is neither below the other nor at an end of its range: a static
-friction of 0 N, or below the dynamic one, borrows the law's form for something else.
+friction of 0 N, or below the dynamic one, borrows the law's form for something else. So does one
+whose Stribeck speed may be the least that there is.
 """
 
 from dataclasses import replace
@@ -36,6 +37,10 @@ FLAT = 4.0
 
 UNSURE = 3.0
 """Standard errors within which a limit, or a parameter that may be equal, makes one doubtful."""
+
+NEAR_LEAST, SURE = 2.0, 1.96
+"""How many times the least value of its range a parameter is at most near it; standard errors of a
+95 % interval."""
 
 HALVINGS = 5
 """How often the place where a profile leaves its flat is halved."""
@@ -132,6 +137,7 @@ def _tied(problem: FitProblem, state: Nested, place: int) -> Nested | None:
             cost(simpler.fit) < cost(state.fit)
             or below_twin(state.fit, tie)
             or _ended(problem, state, tie.path)
+            or any(_may_be_least(problem, state, path) for path in tie.idle)
             or not _asked_for(problem, state, simpler)
         ):
             left = (tie.path, *tie.idle)
@@ -142,19 +148,28 @@ def _tied(problem: FitProblem, state: Nested, place: int) -> Nested | None:
 
 def _ended(problem: FitProblem, state: Nested, path: str) -> bool:
     """Whether a parameter is at an end of the range that its fit had."""
-    whitened = problem.whitened_at(state.fit, state.chosen)
-    ranges = dict(
-        zip(
-            (free.path for free in whitened.free),
-            zip(whitened.lower.tolist(), whitened.upper.tolist(), strict=True),
-            strict=True,
-        )
-    )
     value, error = state.fit.estimate(path)
-    lower, upper = ranges[path]
+    lower, upper = _range(problem, state, path)
     # A range may be a million times as wide as the value: what is surely off its end is not there.
     surely = lower + UNSURE * error < value < upper - UNSURE * error
     return bool(at_limit(value, lower, upper)) and not surely
+
+
+def _may_be_least(problem: FitProblem, state: Nested, path: str) -> bool:
+    """Whether a parameter is near the least value of its range, which its interval holds.
+
+    A Stribeck speed that may be the least there is makes a static level that no motion shows.
+    """
+    value, error = state.fit.estimate(path)
+    lower, _ = _range(problem, state, path)
+    return bool(value <= NEAR_LEAST * lower and value - SURE * error <= lower)
+
+
+def _range(problem: FitProblem, state: Nested, path: str) -> tuple[float, float]:
+    """The range of a parameter in a fit."""
+    whitened = problem.whitened_at(state.fit, state.chosen)
+    at = [free.path for free in whitened.free].index(path)
+    return float(whitened.lower[at]), float(whitened.upper[at])
 
 
 def _asked_for(problem: FitProblem, whole: Nested, simpler: Nested) -> bool:

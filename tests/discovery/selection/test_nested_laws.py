@@ -85,6 +85,21 @@ def test_a_law_with_a_number_at_an_end_of_its_range_is_left(monkeypatch):
     assert less.chosen[0].fitted_paths == [DYNAMIC]
 
 
+@pytest.mark.parametrize(("speed", "left"), [(0.0105, {STATIC, SPEED}), (3.0, set())])
+def test_a_static_level_that_no_motion_shows_leaves_the_law(speed, left, monkeypatch):
+    """A Stribeck speed that may be the least there is, beside a chi-square that is rugged in it."""
+    monkeypatch.setattr(nested_laws, "_asked_for", lambda *_: True)
+    monkeypatch.setattr(nested_laws, "_left", lambda *_: None)
+    bench, fit = fit_of(12.0, 12.0, 5.0, (14.0, 12.0, 3.0))
+    values, covariance = fit.values.copy(), fit.covariance.copy()
+    for path, value in ((STATIC, 24.0), (SPEED, speed)):
+        values[fit.paths.index(path)] = value
+    covariance[fit.paths.index(SPEED), fit.paths.index(SPEED)] = 0.02**2
+    better = fit.chi_square - 1000.0
+    rugged = replace(fit, values=values, covariance=covariance, chi_square=better)
+    assert set(nested(bench, rugged, (DRY,)).undetermined) == left
+
+
 def test_a_static_friction_below_the_dynamic_one_leaves_the_law(monkeypatch):
     """No contact holds less than it drags, even where that form of the law explains more."""
     monkeypatch.setattr(nested_laws, "_asked_for", lambda *_: True)
