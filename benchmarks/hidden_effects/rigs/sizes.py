@@ -53,9 +53,9 @@ def expected(
         hidden: parameters of the hidden law (SI).
         beside: those of all that is hidden, by the catalogue's name.
     """
-    if name == "contact_friction" and "pressure_friction" in (beside or {}):
-        assert beside is not None
-        return {"force_n": hidden["size"] + beside["pressure_friction"]["size"]}
+    seal = (beside or {}).get("pressure_friction")
+    if name == "contact_friction" and seal is not None:
+        return {"force_n": hidden["size"] + seal["size"]}
     if name in OTHERWISE:
         return OTHERWISE[name](hidden)
     if name not in KEYS:

@@ -23,6 +23,7 @@ from pma_gym.discovery.fitting.held_out import held_out_misfit
 from pma_gym.discovery.result.estimates import Undetermined
 from pma_gym.discovery.selection.candidate_fits import cost
 from pma_gym.discovery.selection.profile_limits import limits
+from pma_gym.discovery.selection.rugged_fits import SURE
 from pma_gym.discovery.selection.tied_laws import (
     Chosen,
     Nested,
@@ -38,9 +39,8 @@ FLAT = 4.0
 UNSURE = 3.0
 """Standard errors within which a limit, or a parameter that may be equal, makes one doubtful."""
 
-NEAR_LEAST, SURE = 2.0, 1.96
-"""How many times the least value of its range a parameter is at most near it; standard errors of a
-95 % interval."""
+NEAR_LEAST = 2.0
+"""How many times the least value of its range a parameter near it is at most. An assumption."""
 
 HALVINGS = 5
 """How often the place where a profile leaves its flat is halved."""

@@ -55,7 +55,8 @@ which share of its usual value what does nothing in the simpler law."""
 
 FIRST, WORTH = 3, 0.05
 """How many of them are tried first, and the share of the simpler law's chi-square that they must
-gain for the others to be tried: where the whole law explains no more, its optima do not matter."""
+gain for the others to be tried: where the whole law explains no more, its optima do not matter.
+Assumptions; an axis of three effects ended alike with nine of them and with three."""
 
 FITTED, REFINED = 4, 2
 """How many of the fits to short pieces are fitted to the trials, and how many are refined."""
