@@ -18,7 +18,11 @@ from scipy.stats import chi2
 from pma_gym.data.datasets.dataset import NamedTrial
 from pma_gym.discovery.preparation.acceptance_floors import repeats
 from pma_gym.discovery.preparation.noise import Whitening, autoregression, rest_readings
-from pma_gym.discovery.preparation.nuisance_projection import drift_cosines, line_columns
+from pma_gym.discovery.preparation.nuisance_projection import (
+    drift_columns,
+    half_periods,
+    line_columns,
+)
 from pma_gym.estimation.logged import Logged
 
 Array = NDArray[np.float64]
@@ -67,13 +71,14 @@ def learnt_noise(
     shares = [each.share for each in drifts if np.isfinite(each.share)]
     usual = float(np.sqrt(np.mean(np.square(shares)))) if shares else 0.0
     for channel, before in enumerate(noise):
-        after = _coloured(before, logged, pairs, channel, drifts[channel].waves)
+        waves, share = drifts[channel].waves, 0.0
         if surely and np.isfinite(drifts[channel].share):
             # One pair of repeats tells a size badly; drifts of one rig's sensors are alike.
             share = UNSURE * max(usual, drifts[channel].share)
-            if share > LEAST_DRIFT:
-                waves = drifts[channel].waves
-                after = replace(after, drift=share * before.level, waves=waves)
+        drifts_too = share > LEAST_DRIFT
+        after = _coloured(before, logged, pairs, channel, waves, drifts_too)
+        if drifts_too:
+            after = replace(after, drift=share * before.level, waves=waves)
         if drifts[channel].offset_chance < CHANCE / len(noise):
             offset = UNSURE * drifts[channel].offset
             if offset > LEAST_DRIFT:
@@ -88,9 +93,10 @@ def _coloured(
     pairs: Sequence[tuple[int, int]],
     channel: int,
     waves: int,
+    drifts: bool,
 ) -> Whitening:
     """With the colour of what repeats differ by, or else of rest segments."""
-    parts = [_noise_of_pair(logged, i, j, channel, before.lines, waves) for i, j in pairs]
+    parts = [_noise_of_pair(logged, i, j, channel, before.lines, waves, drifts) for i, j in pairs]
     parts = [part for part in parts if part.size]
     if sum(int(np.isfinite(part).sum()) for part in parts) < ENOUGH_ALIKE:
         parts = rest_readings(logged, channel)
@@ -142,7 +148,7 @@ def _drift(
         if i in pieces and j in pieces:
             means.append(len(apart) * float(apart.mean()) ** 2)
             rows += len(apart)
-        least = min(least, len(drift_cosines(logged[i])))
+        least = min(least, half_periods(logged[i]))
     if not squares:
         return _Drift(np.nan, 1.0)
     # The median, for what is no whole number of half waves leaks into the neighbours.
@@ -176,10 +182,12 @@ def _noise_of_pair(
     channel: int,
     lines: Sequence[float],
     waves: int,
+    drifts: bool,
 ) -> Array:
     """What two repeats differ by over root 2 (SI), less what follows state and command.
 
-    Less lines and what drifts, too; NaN where a reading is missing. Empty where `_apart` is.
+    Less lines and what drifts, too; NaN where a reading is missing. Empty where `_apart` is. Sines
+    are taken out where a drift was found alone: what few readings lose by them looks like colour.
     """
     one, other = logged[i], logged[j]
     apart = _apart(one, other, channel)
@@ -193,7 +201,8 @@ def _noise_of_pair(
         # A signal that is not read, or not where this one is, says nothing of it.
         if known[there].all() and np.ptp(row[there]) > 0.0:
             columns.append(row)
-    columns += drift_cosines(one, waves)
+    slow = drift_columns(one, waves)
+    columns += slow if drifts else slow[::2]
     for hertz in lines:
         columns += line_columns(hertz, one.time)
     basis = np.linalg.qr(np.stack(columns, axis=1)[there])[0]

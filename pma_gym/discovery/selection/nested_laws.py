@@ -5,13 +5,15 @@ stays within `FLAT` of its least up to a limit of the law (a Stribeck speed far 
 the parameter is not determined: it is held at that limit, the fit is repeated without it, and no
 value is given for it, only the bound that the profile has on the other side. An effect may also
 say that a simpler law of its own sets one parameter equal to another (`Effect.ties`) or lacks a
-term (`Effect.terms`); the whole law
-stays where it explains more than its further parameters cost, of readings left out too, and where
-the parameter that may be equal is neither below the other nor at an end of its range: a static
-friction of 0 N, or below the dynamic one, borrows the law's form for something else. So does one
-whose Stribeck speed may be the least that there is.
+term (`Effect.terms`); the whole law stays where it explains more than its further parameters cost,
+of readings left out too, and where the parameter that may be equal is surely above the other and
+not at an end of its range: a static friction of 0 N, or below the dynamic one, borrows the law's
+form for something else. So does one whose Stribeck speed may be the least that there is. Where a
+whole law explains more and its numbers are not surely apart, the interval of the one number holds
+what the whole law says of it.
 """
 
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -23,10 +25,11 @@ from pma_gym.discovery.fitting.held_out import held_out_misfit
 from pma_gym.discovery.result.estimates import Undetermined
 from pma_gym.discovery.selection.candidate_fits import cost
 from pma_gym.discovery.selection.profile_limits import limits
-from pma_gym.discovery.selection.rugged_fits import SURE
+from pma_gym.discovery.selection.rugged_fits import begun_above, interval
 from pma_gym.discovery.selection.tied_laws import (
     Chosen,
     Nested,
+    Tie,
     below_twin,
     fit_held,
     fit_tied,
@@ -38,9 +41,6 @@ FLAT = 4.0
 
 UNSURE = 3.0
 """Standard errors within which a limit, or a parameter that may be equal, makes one doubtful."""
-
-NEAR_LEAST = 2.0
-"""How many times the least value of its range a parameter near it is at most. An assumption."""
 
 HALVINGS = 5
 """How often the place where a profile leaves its flat is halved."""
@@ -61,7 +61,7 @@ def nested(problem: FitProblem, fit: Fitted, chosen: Chosen) -> Nested:
         state = _left(problem, state, path) or state
     # What only mattered together with a parameter that has left does nothing any more.
     state = _all_tied(problem, state)
-    if not state.undetermined:
+    if state.fit is fit:
         return state
     fit = replace(state.fit, covariance=covariance(problem, state.fit, state.chosen))
     return replace(state, fit=fit)
@@ -123,27 +123,83 @@ def _bound(
 def _all_tied(problem: FitProblem, state: Nested) -> Nested:
     """With the simpler law of each effect that has one and bears it."""
     for place in range(len(state.chosen)):
-        state = _tied(problem, state, place) or state
+        state = _tied(problem, state, place)
     return state
 
 
-def _tied(problem: FitProblem, state: Nested, place: int) -> Nested | None:
-    """With the simpler law of an effect; None where it has none, or the trials refuse it."""
-    candidate = state.chosen[place]
-    for tie in simpler_laws(candidate):
+def _tied(problem: FitProblem, state: Nested, place: int) -> Nested:
+    """With the first simpler law of an effect that the trials do not refuse.
+
+    A whole law that does not stay is begun again at the simpler one first: it may have ended in a
+    local minimum.
+    """
+    for tie in simpler_laws(state.chosen[place]):
         simpler = fit_tied(problem, state, place, tie)
-        # What the whole law explains more must be worth its parameters, as anywhere.
-        if simpler is not None and (
-            cost(simpler.fit) < cost(state.fit)
-            or below_twin(state.fit, tie)
-            or _ended(problem, state, tie.path)
-            or any(_may_be_least(problem, state, path) for path in tie.idle)
-            or not _asked_for(problem, state, simpler)
-        ):
+        if simpler is None:
+            continue
+        fit = simpler.fit
+        for whole in _whole_laws(problem, state, simpler, place, tie):
+            if not _explains_more(problem, whole, simpler, tie):
+                continue
+            if _is_shown(problem, whole, tie):
+                state = whole
+                break
+            if tie.twin:
+                fit = _as_wide(fit, whole.fit, tie.twin)
+        else:
             left = (tie.path, *tie.idle)
             known = {each: Undetermined(None, None, unit(each)) for each in left}
-            return replace(simpler, undetermined={**state.undetermined, **known})
-    return None
+            return replace(simpler, fit=fit, undetermined={**state.undetermined, **known})
+    return state
+
+
+def _is_shown(problem: FitProblem, whole: Nested, tie: Tie) -> bool:
+    """Whether intervals set two numbers of a law apart, or one from 0, and leave out what hides it.
+
+    All optima that explain the trials about as well are counted. The least value of what does
+    nothing in the simpler law, as a Stribeck speed, hides the first number from every motion.
+    """
+    twin = interval(whole.fit, tie.twin)[1] if tie.twin else 0.0
+    apart = interval(whole.fit, tie.path)[0] > twin
+    lows = [(interval(whole.fit, each)[0], _range(problem, whole, each)[0]) for each in tie.idle]
+    return apart and all(low > least for low, least in lows)
+
+
+def _as_wide(simpler: Fitted, whole: Fitted, path: str) -> Fitted:
+    """The simpler law's fit, with what the whole law says of a parameter in its spread.
+
+    Where the whole law explains more, but not which of its numbers is the greater, the one number
+    may be any of them.
+    """
+    value = simpler.estimate(path)[0]
+    low, high = interval(whole, path)
+    if not np.isfinite(high - low):
+        return simpler
+    least, most = simpler.spread.get(path, (value, value))
+    return replace(simpler, spread={**simpler.spread, path: (min(low, least), max(high, most))})
+
+
+def _whole_laws(
+    problem: FitProblem, state: Nested, simpler: Nested, place: int, tie: Tie
+) -> Iterator[Nested]:
+    """The whole law of an effect as it was fitted, and begun at the simpler one."""
+    yield state
+    fit = begun_above(problem, simpler.fit, state.chosen, place, tie)
+    if fit is not None:
+        yield replace(state, fit=fit)
+
+
+def _explains_more(problem: FitProblem, whole: Nested, simpler: Nested, tie: Tie) -> bool:
+    """Whether the whole law of an effect explains more than its further parameters cost.
+
+    What it explains more must be worth them as anywhere, with readings left out too.
+    """
+    return (
+        cost(whole.fit) <= cost(simpler.fit)
+        and not below_twin(whole.fit, tie)
+        and not _ended(problem, whole, tie.path)
+        and _asked_for(problem, whole, simpler)
+    )
 
 
 def _ended(problem: FitProblem, state: Nested, path: str) -> bool:
@@ -153,16 +209,6 @@ def _ended(problem: FitProblem, state: Nested, path: str) -> bool:
     # A range may be a million times as wide as the value: what is surely off its end is not there.
     surely = lower + UNSURE * error < value < upper - UNSURE * error
     return bool(at_limit(value, lower, upper)) and not surely
-
-
-def _may_be_least(problem: FitProblem, state: Nested, path: str) -> bool:
-    """Whether a parameter is near the least value of its range, which its interval holds.
-
-    A Stribeck speed that may be the least there is makes a static level that no motion shows.
-    """
-    value, error = state.fit.estimate(path)
-    lower, _ = _range(problem, state, path)
-    return bool(value <= NEAR_LEAST * lower and value - SURE * error <= lower)
 
 
 def _range(problem: FitProblem, state: Nested, path: str) -> tuple[float, float]:

@@ -12,6 +12,7 @@ well as the best say how well the parameters are known.
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from itertools import islice
 
 import numpy as np
 from numpy.typing import NDArray
@@ -98,10 +99,52 @@ def best_of_optima(
     ends = [_interval(smooth, each, chosen) for each in _equals(smooth, begun, chosen)] + [
         _interval(problem, each, chosen) for each in _equals(problem, fits, chosen)
     ]
+    return _with_spread(best, ends)
+
+
+def begun_above(
+    problem: FitProblem, simpler: Fitted, chosen: Chosen, place: int, tie: Tie
+) -> Fitted | None:
+    """The whole law of an effect begun a little above the simpler one, with the spread of its fits.
+
+    None where no fit ends with the first of two parameters above its twin.
+
+    Args:
+        problem: the trials, with the noise that the fit leaves.
+        simpler: a fit of the simpler law.
+        chosen: the effects, with the whole law.
+        place: of the effect in them.
+        tie: what makes its law simpler; of two parameters, or nothing is begun.
+    """
+    if not tie.twin:
+        return None
+    begun = (
+        problem.fit(simpler.model.replace(start), chosen)
+        for start in islice(_starts(chosen[place], tie, simpler), FIRST)
+    )
+    fits = [each for each in begun if each is not None and not below_twin(each, tie)]
+    if not fits:
+        return None
+    best = min(fits, key=_chi_square)
+    # Pulls at a fit that stopped short of its optimum say nothing of how sure its values are.
+    equals = [(each.values, each.values) for each in _equals(problem, fits, chosen)]
+    return _with_spread(best, [_interval(problem, best, chosen), *equals])
+
+
+def interval(fit: Fitted, path: str) -> tuple[float, float]:
+    """Least and greatest value (95 %) of a parameter of a fit, its equal optima counted."""
+    value, error = fit.estimate(path)
+    low, high = fit.spread.get(path, (value, value))
+    if not np.isfinite(error):
+        return -np.inf, np.inf
+    return min(value - SURE * error, low), max(value + SURE * error, high)
+
+
+def _with_spread(best: Fitted, ends: Sequence[tuple[Array, Array]]) -> Fitted:
+    """A fit with the least and greatest values of intervals, shape (parameters,) each."""
     low = np.min([best.values, *(each[0] for each in ends)], axis=0).tolist()
     high = np.max([best.values, *(each[1] for each in ends)], axis=0).tolist()
-    spread = zip(best.paths, zip(low, high, strict=True), strict=True)
-    return replace(best, spread=dict(spread))
+    return replace(best, spread=dict(zip(best.paths, zip(low, high, strict=True), strict=True)))
 
 
 def _interval(problem: FitProblem, fit: Fitted, chosen: Chosen) -> tuple[Array, Array]:

@@ -74,6 +74,21 @@ def test_friction_that_falls_with_the_speed_keeps_its_law():
     assert less.fit is fit
 
 
+def test_a_law_that_ended_below_one_number_is_begun_again_at_it():
+    """A fit that ended in a local minimum, with a static friction of nothing, hides the fall."""
+    bench, fit = fit_of(18.0, 12.0, 30.0, (17.0, 12.0, 20.0))
+    ended = {STATIC: 1.0, DYNAMIC: 13.0, SPEED: 0.1}
+    at = [ended.get(path, value) for path, value in zip(fit.paths, fit.values, strict=True)]
+    local = replace(fit, values=np.array(at), chi_square=1e6)
+    less = nested(bench, local, (DRY,))
+    assert not less.undetermined
+    assert less.fit.chi_square == pytest.approx(fit.chi_square, rel=0.01)
+    assert less.fit.estimate(DYNAMIC)[0] == pytest.approx(12.0, rel=0.02)
+    for path in (STATIC, DYNAMIC, SPEED):
+        low, high = less.fit.spread[path]
+        assert low < less.fit.estimate(path)[0] < high
+
+
 def test_a_law_with_a_number_at_an_end_of_its_range_is_left(monkeypatch):
     """Readings left out may ask for a static friction of 0: it stands for something else."""
     monkeypatch.setattr(nested_laws, "_asked_for", lambda *_: True)
@@ -85,7 +100,9 @@ def test_a_law_with_a_number_at_an_end_of_its_range_is_left(monkeypatch):
     assert less.chosen[0].fitted_paths == [DYNAMIC]
 
 
-@pytest.mark.parametrize(("speed", "left"), [(0.0105, {STATIC, SPEED}), (3.0, set())])
+@pytest.mark.parametrize(
+    ("speed", "left"), [(0.0105, {STATIC, SPEED}), (0.03, {STATIC, SPEED}), (3.0, set())]
+)
 def test_a_static_level_that_no_motion_shows_leaves_the_law(speed, left, monkeypatch):
     """A Stribeck speed that may be the least there is, beside a chi-square that is rugged in it."""
     monkeypatch.setattr(nested_laws, "_asked_for", lambda *_: True)
