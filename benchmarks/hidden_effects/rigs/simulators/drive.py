@@ -43,22 +43,25 @@ class Drive:
 
     def begin(self, command: float) -> None:
         """The command of the first row, which has been there for long."""
-        gained = self._gained(command)
-        self._commands, self._lagged = [gained], gained
+        self._commands, self._lagged = [command], command
         rows = self.transmission.delay / self.interval
         self._whole, self._part = math.floor(rows), rows - math.floor(rows)
-        self._late = [gained, gained, gained]
+        self._late = [command, command, command]
 
     def push(self, command: float) -> None:
         """The command of the next row."""
         if len(self._commands) > 1:
-            self._lagged = self.at(self.interval)
-        self._commands.append(self._gained(command))
+            self._lagged = self._passed(self.interval)
+        self._commands.append(command)
         rows = [len(self._commands) - 1 - self._whole - each for each in (2, 1, 0)]
         self._late = [self._commands[max(row, 0)] for row in rows]
 
     def at(self, time: float) -> float:
         """Force (N, N m) so many seconds after the row before the last."""
+        return self._gained(self._passed(time))
+
+    def _passed(self, time: float) -> float:
+        """What has passed delay and lag by then; the gain goes by its sign, between rows too."""
         part = self._part
         before, start, end = self._late
         span, lag = self.interval, self.transmission.lag
