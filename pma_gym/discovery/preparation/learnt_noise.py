@@ -141,6 +141,7 @@ def _drift(
         apart = _apart(logged[i], logged[j], channel)
         if not apart.size:
             continue
+        apart = apart[_reading_rows(logged[i], logged[j])]
         at, there = np.arange(len(apart)), np.isfinite(apart)
         apart = np.interp(at, at[there], apart[there])
         squares.append((_cosines(len(apart), MOST_WAVES + NEAR) @ (apart - apart.mean())) ** 2)
@@ -207,20 +208,25 @@ def _noise_of_pair(
         columns += line_columns(hertz, one.time)
     basis = np.linalg.qr(np.stack(columns, axis=1)[there])[0]
     apart[there] -= basis @ (basis.T @ apart[there])
-    return apart
+    return apart[_reading_rows(one, other)]
 
 
 def _apart(one: Logged, other: Logged, channel: int) -> Array:
     """What two repeats differ by over root 2 (SI), NaN where either has no reading, shape (rows,).
 
     Empty where their times differ, or more than `MOST_MISSING` of the readings are missing: a
-    series with many holes tells no colour.
+    series with many holes tells no colour. Rows of commands alone are no holes.
     """
     if not np.array_equal(one.time, other.time):
         return np.empty(0)
     read = (one.counts[channel] > 0.0) & (other.counts[channel] > 0.0)
-    if not read.any() or np.mean(~read) > MOST_MISSING:
+    if not read.any() or np.mean(~read[_reading_rows(one, other)]) > MOST_MISSING:
         return np.empty(0)
     apart = np.full(len(one.time), np.nan)
     apart[read] = (other.measured[channel] - one.measured[channel])[read] / np.sqrt(2.0)
     return apart
+
+
+def _reading_rows(one: Logged, other: Logged) -> NDArray[np.bool_]:
+    """Where two repeats have a reading of any signal; long logs keep rows of commands alone."""
+    return np.asarray(np.any(one.counts + other.counts > 0.0, axis=0))

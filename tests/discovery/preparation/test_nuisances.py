@@ -78,6 +78,21 @@ def test_repeats_with_holes_tell_the_noise_too() -> None:
     assert learnt.drift > LEVEL
 
 
+def test_rows_of_commands_alone_hide_no_drift() -> None:
+    """Averaged logs keep rows without readings where commands bend; they are no holes."""
+    rng, at = np.random.default_rng(7), np.arange(2048)
+    slow = np.cos(np.pi * at / 2048)
+    alone = (at > 500) & (at % 2 == 1)
+    noises = [rng.standard_normal(2048) + sign * slow for sign in (1.0, -0.8)]
+    for noise in noises:
+        noise[alone] = np.nan
+    logged, named = _logged(noises)
+    assert np.mean(logged[0].counts[CHANNEL] > 0.0) < 0.7
+    learnt = learnt_noise(_levels(), logged, named)[CHANNEL]
+    assert learnt.drift > 0.3 * LEVEL
+    assert learnt.coefficients == ()
+
+
 def test_repeated_pieces_of_runs_tell_a_drift_by_their_constants() -> None:
     """A wave of 32 s is a constant in each piece of a second; between whole trials it is a zero."""
     rng, at = np.random.default_rng(8), np.arange(2 * 16 * 128) / (16 * 128)
