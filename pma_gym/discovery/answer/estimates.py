@@ -52,9 +52,8 @@ def estimate(findings: Findings, fit: Fitted, path: str) -> Estimate:
     limit = at_limit(value, lower, upper)
     if not np.isfinite(error):
         return Estimate(value, None, None, unit(path), limit)
-    least, most = fit.spread.get(path, (value, value))
-    low = max(min(value - 1.96 * error, least), lower)
-    high = min(max(value + 1.96 * error, most), upper)
+    low, high = fit.interval(path, error)
+    low, high = max(low, lower), min(high, upper)
     # A range may be a million times as wide as what a light axis has: what is surely off an end of
     # it is not at that end.
     limit = "" if lower < low and high < upper else limit

@@ -25,6 +25,9 @@ ROUNDS = 25
 LARGER = (30.0, 5.0)
 """How many times as large the noise is taken for on the way to a first fit."""
 
+SURE = 1.96
+"""Standard errors of a 95 % interval."""
+
 CAUGHT, EASIER = 3.0, 10.0
 """Residual, in standard deviations of the noise, from which on a fit may have been caught; how many
 times smaller the noise is taken for from one fit to the next on the way out."""
@@ -68,6 +71,21 @@ class Fitted:
         """A parameter's value and its standard error, in file units."""
         at = self.paths.index(path)
         return float(self.values[at]), float(np.sqrt(self.covariance[at, at]))
+
+    def interval(self, path: str, error: float | None = None) -> tuple[float, float]:
+        """Least and greatest value (95 %) of a parameter, in file units; equal optima count.
+
+        Args:
+            path: the parameter.
+            error: its standard error; the fit's own if not given. Where it is not finite,
+                neither end is.
+        """
+        value, own = self.estimate(path)
+        error = own if error is None else error
+        if not np.isfinite(error):
+            return -np.inf, np.inf
+        low, high = self.spread.get(path, (value, value))
+        return min(value - SURE * error, low), max(value + SURE * error, high)
 
 
 def _chi_square(fit: Fitted) -> float:

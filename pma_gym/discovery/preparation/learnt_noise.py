@@ -75,9 +75,9 @@ def learnt_noise(
         if surely and np.isfinite(drifts[channel].share):
             # One pair of repeats tells a size badly; drifts of one rig's sensors are alike.
             share = UNSURE * max(usual, drifts[channel].share)
-        drifts_too = share > LEAST_DRIFT
-        after = _coloured(before, logged, pairs, channel, waves, drifts_too)
-        if drifts_too:
+        is_drifting = share > LEAST_DRIFT
+        after = _coloured(before, logged, pairs, channel, waves, is_drifting)
+        if is_drifting:
             after = replace(after, drift=share * before.level, waves=waves)
         if drifts[channel].offset_chance < CHANCE / len(noise):
             offset = UNSURE * drifts[channel].offset
@@ -93,10 +93,12 @@ def _coloured(
     pairs: Sequence[tuple[int, int]],
     channel: int,
     waves: int,
-    drifts: bool,
+    is_drifting: bool,
 ) -> Whitening:
     """With the colour of what repeats differ by, or else of rest segments."""
-    parts = [_noise_of_pair(logged, i, j, channel, before.lines, waves, drifts) for i, j in pairs]
+    parts = [
+        _noise_of_pair(logged, i, j, channel, before.lines, waves, is_drifting) for i, j in pairs
+    ]
     parts = [part for part in parts if part.size]
     if sum(int(np.isfinite(part).sum()) for part in parts) < ENOUGH_ALIKE:
         parts = rest_readings(logged, channel)
@@ -183,12 +185,12 @@ def _noise_of_pair(
     channel: int,
     lines: Sequence[float],
     waves: int,
-    drifts: bool,
+    is_drifting: bool,
 ) -> Array:
     """What two repeats differ by over root 2 (SI), less what follows state and command.
 
     Less lines and what drifts, too; NaN where a reading is missing. Empty where `_apart` is. Sines
-    are taken out where a drift was found alone: what few readings lose by them looks like colour.
+    are taken out only where there is a drift: what few readings lose by them looks like colour.
     """
     one, other = logged[i], logged[j]
     apart = _apart(one, other, channel)
@@ -203,7 +205,7 @@ def _noise_of_pair(
         if known[there].all() and np.ptp(row[there]) > 0.0:
             columns.append(row)
     slow = drift_columns(one, waves)
-    columns += slow if drifts else slow[::2]
+    columns += slow if is_drifting else slow[::2]
     for hertz in lines:
         columns += line_columns(hertz, one.time)
     basis = np.linalg.qr(np.stack(columns, axis=1)[there])[0]

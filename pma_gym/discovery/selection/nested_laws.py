@@ -25,7 +25,7 @@ from pma_gym.discovery.fitting.held_out import held_out_misfit
 from pma_gym.discovery.result.estimates import Undetermined
 from pma_gym.discovery.selection.candidate_fits import cost
 from pma_gym.discovery.selection.profile_limits import limits
-from pma_gym.discovery.selection.rugged_fits import begun_above, interval
+from pma_gym.discovery.selection.rugged_fits import begun_above
 from pma_gym.discovery.selection.tied_laws import (
     Chosen,
     Nested,
@@ -159,9 +159,9 @@ def _is_shown(problem: FitProblem, whole: Nested, tie: Tie) -> bool:
     All optima that explain the trials about as well are counted. The least value of what does
     nothing in the simpler law, as a Stribeck speed, hides the first number from every motion.
     """
-    twin = interval(whole.fit, tie.twin)[1] if tie.twin else 0.0
-    apart = interval(whole.fit, tie.path)[0] > twin
-    lows = [(interval(whole.fit, each)[0], _range(problem, whole, each)[0]) for each in tie.idle]
+    twin = whole.fit.interval(tie.twin)[1] if tie.twin else 0.0
+    apart = whole.fit.interval(tie.path)[0] > twin
+    lows = [(whole.fit.interval(each)[0], _range(problem, whole, each)[0]) for each in tie.idle]
     return apart and all(low > least for low, least in lows)
 
 
@@ -172,7 +172,7 @@ def _as_wide(simpler: Fitted, whole: Fitted, path: str) -> Fitted:
     may be any of them.
     """
     value = simpler.estimate(path)[0]
-    low, high = interval(whole, path)
+    low, high = whole.interval(path)
     if not np.isfinite(high - low):
         return simpler
     least, most = simpler.spread.get(path, (value, value))

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
 from pma_gym.discovery.fitting.covariance import covariance
 from pma_gym.discovery.fitting.derivative_free import refined
-from pma_gym.discovery.fitting.fit_problem import FitProblem, Fitted
+from pma_gym.discovery.fitting.fit_problem import SURE, FitProblem, Fitted
 from pma_gym.discovery.fitting.free_parameters import values
 from pma_gym.discovery.fitting.short_pieces import in_short_pieces
 from pma_gym.discovery.selection.tied_laws import (
@@ -68,9 +68,6 @@ large: where one trial outweighs all others, chance alone would allow anything."
 
 AT_NOISE = 1.1
 """Noises up to which a fit counts as at the noise: an assumption."""
-
-SURE = 1.96
-"""Standard errors of a 95 % interval."""
 
 
 def is_rugged(fit: Fitted, chosen: Chosen) -> bool:
@@ -131,15 +128,6 @@ def begun_above(
     return _with_spread(best, [_interval(problem, best, chosen), *equals])
 
 
-def interval(fit: Fitted, path: str) -> tuple[float, float]:
-    """Least and greatest value (95 %) of a parameter of a fit, its equal optima counted."""
-    value, error = fit.estimate(path)
-    low, high = fit.spread.get(path, (value, value))
-    if not np.isfinite(error):
-        return -np.inf, np.inf
-    return min(value - SURE * error, low), max(value + SURE * error, high)
-
-
 def _with_spread(best: Fitted, ends: Sequence[tuple[Array, Array]]) -> Fitted:
     """A fit with the least and greatest values of intervals, shape (parameters,) each."""
     low = np.min([best.values, *(each[0] for each in ends)], axis=0).tolist()
@@ -163,7 +151,7 @@ def settled(problem: FitProblem, fit: Fitted, chosen: Chosen) -> Fitted:
     """A fit near an optimum, refined; or the best of more optima where that does not converge.
 
     A fit that leaves little more than the noise is not begun anew: others hardly leave less. Nor is
-    a law refined that the simpler one takes the place of anyway (`nested_laws`).
+    one refined that `nested_laws` begins again or leaves for the simpler law.
 
     Args:
         problem: the trials, with the noise that the fit leaves.
