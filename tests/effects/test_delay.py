@@ -5,7 +5,15 @@ import pytest
 
 from pma_gym.data.trial import Trial
 from pma_gym.effects import CATALOGUE
-from pma_gym.effects.delay import ELEMENTS, delayed_load
+from pma_gym.effects.delay import (
+    DriveDelay,
+    RegulatorDelay,
+    delayed_load,
+    delayed_load_rate,
+    delayed_pressure,
+    delayed_pressure_rate,
+)
+from pma_gym.effects.sensors.sensor_delay import SensorDelay, late_reading, late_reading_rate
 from pma_gym.plant.model import load_model
 from pma_gym.plant.plant import Plant
 
@@ -18,14 +26,28 @@ def multisine(time, mean, swing):
     return mean + swing * sum(waves) / 3.0
 
 
-def test_the_ladder_is_bessels_filter():
-    first, second, third, fourth = ELEMENTS
-    # s^4 + 10 s^3 + 45 s^2 + 105 s + 105 over 105, by the determinant of the ladder.
-    product = first * second * third * fourth
-    assert 1.0 / product == pytest.approx(105.0)
-    assert second * third * fourth / product == pytest.approx(10.0)
-    assert (first * second + first * fourth + third * fourth) / product == pytest.approx(45.0)
-    assert (second + fourth) / product == pytest.approx(105.0)
+LAWS = {
+    "drive": (delayed_load, delayed_load_rate, DriveDelay),
+    "regulator": (delayed_pressure, delayed_pressure_rate, RegulatorDelay),
+    "sensor": (late_reading, late_reading_rate, SensorDelay),
+}
+
+
+@pytest.mark.parametrize("name", LAWS)
+@pytest.mark.parametrize(("angle", "error"), [(0.3, 1e-8), (0.5, 2e-7), (1.0, 2e-5), (2.0, 2e-3)])
+def test_amplitude_and_phase_are_those_of_a_true_delay(name, angle, error):
+    """The response at w T = angle, from the laws themselves, beside exp(-i w T)."""
+    law, law_rate, parameters = LAWS[name]
+    p = parameters(1.0, DELAY_S)
+
+    def rates(value, memory):
+        pairs = law_rate(value, tuple(memory), p)
+        return np.array([s - decay * m for (s, decay), m in zip(pairs, memory, strict=True)])
+
+    drift = np.stack([rates(0.0, unit) for unit in np.eye(4)], axis=1)
+    state = np.linalg.solve(1j * angle / DELAY_S * np.eye(4) - drift, rates(1.0, np.zeros(4)))
+    assert abs(law(1.0, state, p) - np.exp(-1j * angle)) < error
+    assert law(1.0, (0.0, 1.0, 0.0, 1.0), p) == pytest.approx(1.0)
 
 
 @pytest.mark.parametrize("share", [1.0, 0.4])
@@ -45,8 +67,8 @@ def test_a_delayed_drive_asks_for_what_was_asked_before(station_with, share):
     expected = asked + share * (late - asked)
     later = time > 0.2
     error = np.abs(loads - expected)[later].max() / np.ptp(asked)
-    # At 3 Hz, w = 0.38: amplitude 1 % low, a third of the swing.
-    assert error < 0.006
+    # At 3 Hz, w = 0.38: the law is exact to 1e-8, the commands are joined linearly.
+    assert error < 2e-4
     assert np.abs(loads - asked)[later].max() / np.ptp(asked) > 0.1 * share
 
 
@@ -67,8 +89,10 @@ def test_a_delayed_regulator_fills_a_while_later(station_with, station):
     assert np.abs(late_pressures - plain)[later].max() > 0.05 * np.ptp(plain)
 
 
-@pytest.mark.parametrize("name", ["drive_delay", "regulator_delay"])
-def test_a_step_arrives_late_and_never_the_wrong_way(station_with, name):
+@pytest.mark.parametrize(
+    ("name", "law"), [("drive_delay", delayed_load), ("regulator_delay", delayed_pressure)]
+)
+def test_a_step_arrives_late_after_a_tenth_of_it_the_wrong_way(station_with, name, law):
     plant = station_with(name, delay_ms=1e3 * DELAY_S)
     time = np.arange(0.0, 0.2, 0.0005)
     low, high = (plant.regulator_voltage(p) for p in (300e3, 350e3))
@@ -76,11 +100,16 @@ def test_a_step_arrives_late_and_never_the_wrong_way(station_with, name):
     motor = np.where(ahead & (name == "drive_delay"), 3.0, 2.0)
     regulator = np.where(ahead & (name == "regulator_delay"), high, low)
     states, _ = plant.run(time, motor, regulator)
-    last = states[:, plant.states.index(CATALOGUE[name].memory_names[-1])]
-    share = (last - last[0]) / (last[-1] - last[0])
-    assert np.all(share > -1e-6) and share.max() < 1.01
+    columns = [plant.states.index(memory) for memory in CATALOGUE[name].memory_names]
+    p = plant.model.parameters[name]
+    # With a share of 1, the law passes nothing of the command at once.
+    came = np.array([law(0.0, tuple(memory), p) for memory in states[:, columns]])
+    share = (came - came[0]) / (came[-1] - came[0])
+    assert share.min() == pytest.approx(-0.099, abs=0.002)
+    assert share.max() == pytest.approx(1.052, abs=0.002)
     assert time[np.argmax(share > 0.5)] == pytest.approx(DELAY_S, abs=0.001)
-    assert np.all(share[time < 0.2 * DELAY_S] < 0.01)
+    # The impulse of a step is right: what was missed before and after adds up to the delay.
+    assert np.trapezoid(1.0 - share, time) == pytest.approx(DELAY_S, rel=0.02)
 
 
 def test_delays_begin_at_rest_and_change_no_rest(station_with, station):
@@ -98,8 +127,8 @@ def test_delays_are_part_of_the_linear_system(station_with, station):
     at = late.output_labels.index("extension"), late.input_labels.index("motor_voltage")
     frequency = 2.0 * np.pi * 2.0
     ratio = late(1j * frequency)[at] / plain(1j * frequency)[at]
-    assert np.angle(ratio) == pytest.approx(-frequency * DELAY_S, rel=1e-3)
-    assert abs(ratio) == pytest.approx(1.0, abs=0.006)
+    assert np.angle(ratio) == pytest.approx(-frequency * DELAY_S, rel=1e-6)
+    assert abs(ratio) == pytest.approx(1.0, abs=1e-6)
 
 
 def test_a_cascade_has_a_delayed_regulator_too():

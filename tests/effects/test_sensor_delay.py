@@ -7,12 +7,7 @@ import pytest
 
 from pma_gym.data.trial import Trial
 from pma_gym.effects import CATALOGUE
-from pma_gym.effects.sensors.sensor_delay import (
-    SENSOR_DELAYS,
-    SensorDelay,
-    late_reading,
-    late_reading_rate,
-)
+from pma_gym.effects.sensors.sensor_delay import SENSOR_DELAYS
 from pma_gym.plant.equilibrium.solver import NoLoadEquilibria
 from pma_gym.plant.model import Model, ModelError
 from pma_gym.plant.plant import Plant
@@ -26,22 +21,6 @@ def test_every_sensor_of_the_catalogue_may_be_late():
     }
     late = {e.port.replace("sensor_delay:", "sensor:"): e.name for e in SENSOR_DELAYS}
     assert late == {port: f"{name}_delay" for port, name in sensors.items()}
-
-
-@pytest.mark.parametrize(("angle", "error"), [(0.3, 1e-8), (0.5, 2e-7), (1.0, 2e-5), (2.0, 2e-3)])
-def test_amplitude_and_phase_are_those_of_a_true_delay(angle, error):
-    """The response at w T = angle, from the laws themselves, beside exp(-i w T)."""
-    p = SensorDelay(1.0, DELAY_S)
-
-    def rates(signal, memory):
-        pairs = late_reading_rate(signal, tuple(memory), p)
-        return np.array([s - decay * m for (s, decay), m in zip(pairs, memory, strict=True)])
-
-    drift = np.stack([rates(0.0, unit) for unit in np.eye(4)], axis=1)
-    state = np.linalg.solve(1j * angle / DELAY_S * np.eye(4) - drift, rates(1.0, np.zeros(4)))
-    response = late_reading(1.0, state, p)
-    assert abs(response - np.exp(-1j * angle)) < error
-    assert late_reading(1.0, (0.0, 1.0, 0.0, 1.0), p) == pytest.approx(1.0)
 
 
 def test_a_delay_without_its_sensor_is_refused(station):

@@ -1,27 +1,15 @@
 """Readings that are late by a fixed time: two loggers, a bus, a block of samples.
 
-A reading is smooth where a command may step, and it is read to a part in a thousand or better. So
-the ladder of `pma_gym.effects.delay` has here the response of a Pade approximation of order [2/4],
-whose amplitude is true too. The errors for a delay T at frequency f, with w = 2 pi f T, are
-
-    phase       1e-7 rad at w = 0.5, 1e-5 rad at w = 1, 1e-3 rad at w = 2
-    amplitude   1e-8 at w = 0.5, 4e-6 at w = 1, 8e-4 at w = 2
-
-The price is a step, which goes the wrong way by a tenth of it before it comes.
+The law is that of a late command (`pma_gym.effects.delay`, with its errors). A reading is smooth
+where a command may step, so the step's price is not paid here.
 """
 
 from typing import Annotated, NamedTuple
 
-from pma_gym.effects.delay import ladder
+from pma_gym.effects.delay import ELEMENTS, late, late_rate
 from pma_gym.effects.effect import Effect
 from pma_gym.effects.sensors.sensors import FORCE_SENSOR, JOINT_SENSORS, SENSORS, TACHOMETER
 from pma_gym.units import Quantity
-
-ELEMENTS = (1.0 / 12.0, 3.0 / 13.0, 169.0 / 510.0, 17.0 / 39.0)
-"""Time constants of the ladder over the delay, from s^4 + 12 s^3 + 72 s^2 + 240 s + 360 (Routh)."""
-
-OUTPUT = (3.0 / 13.0, -13.0 / 17.0, 10.0 / 13.0)
-"""Weights of m_2, m_3 and m_4, for the numerator 12 s^2 - 120 s + 360."""
 
 _SHARE = Quantity("1", 0, 1, "1 for a delay of every reading", 0.0, usual=1)
 _DELAY = Quantity(
@@ -48,10 +36,10 @@ def late_reading(signal, memory, p):
     Returns:
         Value (SI), before the sensor's lag.
     Source:
-        Pade approximation of order [2/4] of exp(-s T) as a ladder; the module has its errors.
+        Pade approximation of order [2/4] of exp(-s T) as a ladder, with the errors that
+        `pma_gym.effects.delay` states.
     """
-    late = sum(weight * state for weight, state in zip(OUTPUT, memory[1:], strict=True))
-    return (signal - p.share * signal) + late
+    return late(signal, memory, p.share)
 
 
 def late_reading_rate(signal, memory, p):
@@ -64,7 +52,7 @@ def late_reading_rate(signal, memory, p):
     Returns:
         For each memory (source, decay) with m' = source - decay * m (SI per s).
     """
-    return ladder(p.share * signal, memory, p.delay, ELEMENTS)
+    return late_rate(signal, memory, p.share, p.delay)
 
 
 def _delay(sensor: Effect) -> Effect:
