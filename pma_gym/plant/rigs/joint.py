@@ -26,8 +26,9 @@ PORTS: dict[str, Port] = {
 }
 """Ports of the joint, with the number of effects and the use of their results."""
 
-SCALES: dict[str, float] = {"angle": 1.0, "spin": 4.0}
-"""Error scales of angle and speed (rad, rad/s)."""
+SCALES: dict[str, float] = {"angle": 0.04, "spin": 0.16}
+"""Error scales of angle and speed (rad, rad/s): a 25th of a station's, for the reason of a slide's
+(`pma_gym.plant.rigs.slide`)."""
 
 LEAST_COMMAND = 0.1
 """Error scales of delayed commands (N m, V): the range of a small drive."""
