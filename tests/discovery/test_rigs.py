@@ -11,7 +11,9 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import pma_gym.envs  # noqa: F401
+from benchmarks.hidden_effects.generation.files import write_case
 from benchmarks.hidden_effects.generation.groups import group
+from benchmarks.hidden_effects.generation.undecidable import BLOCKS
 from pma_gym.data.datasets.dataset import Dataset, NamedTrial, read_dataset
 from pma_gym.data.files.trial_files import write_trial
 from pma_gym.data.quality.clipping import ends
@@ -232,6 +234,25 @@ def test_dry_friction_is_found_at_one_and_two_kilohertz():
     diagnosis = diagnose(logs, DRIVEN, propose=False)
     assert named(diagnosis) == ["coulomb_friction"], diagnosis.sentence
     assert diagnosis.effects[0].parameters["dynamic_n"].value == pytest.approx(12.0, rel=0.05)
+
+
+@pytest.mark.campaign
+def test_friction_by_load_of_a_foreign_slide_lies_in_its_interval(tmp_path):
+    """Its deflection before it slips is looked for in short pieces, and again in the trials."""
+    seed, number = 705318264, 118
+    case = BLOCKS["rigs"].draw(seed, number)
+    (hidden,) = case.truth["effects"]
+    write_case(case, tmp_path, number)
+    (folder,) = (tmp_path / "cases").iterdir()
+    diagnosis = diagnose(read_dataset(folder), propose=False)
+    assert named(diagnosis) == [hidden["name"]], diagnosis.sentence
+    (friction,) = diagnosis.effects
+    share = friction.parameters["drive_share_percent"]
+    assert share.low is not None and share.high is not None
+    assert share.low < 100.0 * hidden["parameters"]["size"] < share.high
+    # The slide carries nothing.
+    assert set(friction.undetermined) == {"carried_share_percent"}
+    assert "carried share not determined" in diagnosis.sentence
 
 
 @pytest.mark.campaign
