@@ -32,6 +32,9 @@ CAUGHT, EASIER = 3.0, 10.0
 """Residual, in standard deviations of the noise, from which on a fit may have been caught; how many
 times smaller the noise is taken for from one fit to the next on the way out."""
 
+ROUNDING = 1e-3
+"""Share of a standard error that a parameter's whole range must be, or trials do not show it."""
+
 RUGGED, STIFFER, SUSPECT = "cable.stiffness_n_per_mm", (0.75, 0.9, 1.1, 1.3), 1.3
 """What chi-square is rugged in, at which shares of the given value fits begin from it, and the
 chi-square a reading from which on they do."""
@@ -338,12 +341,24 @@ class FitProblem:
             tuple(candidate.name for candidate in extra),
             paths,
             ended_at,
-            inverse(search.best.curvature),
+            inverse(_shown(search.best.curvature, whitened.upper - whitened.lower)),
             search.best.chi_square,
             search.moves,
             converged,
             whitened.needed_reach(search.values),
         )
+
+
+def _shown(curvature: Array, widths: Array) -> Array:
+    """A curvature without what trials do not show: what is left of that is rounding.
+
+    Args:
+        curvature: half the second derivatives of chi-square, shape (p, p).
+        widths: of the parameters' ranges, shape (p,).
+    """
+    own = np.diag(curvature)
+    shown = np.where(own > 0.0, own * widths**2, 0.0) > ROUNDING**2
+    return np.where(np.outer(shown, shown), curvature, 0.0)
 
 
 def _at(model: Model, search: LevenbergMarquardt) -> Model:

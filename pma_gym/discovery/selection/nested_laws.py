@@ -10,7 +10,8 @@ of readings left out too, and where the parameter that may be equal is surely ab
 not at an end of its range: a static friction of 0 N, or below the dynamic one, borrows the law's
 form for something else. So does one whose Stribeck speed may be the least that there is. Where a
 whole law explains more and its numbers are not surely apart, the interval of the one number holds
-what the whole law says of it.
+what the whole law says of it; where the one number leaves more than three noises, the whole law
+stays.
 """
 
 from collections.abc import Iterator
@@ -72,10 +73,13 @@ def _left(problem: FitProblem, state: Nested, path: str) -> Nested | None:
     place = _place(state.chosen, path)
     candidate = state.chosen[place]
     shape = not candidate.amplitudes[candidate.paths.index(path)]
-    if path not in candidate.fitted_paths or len(candidate.fitted_paths) < 2 or not shape:
+    if path not in candidate.fitted_paths or len(candidate.fitted_paths) < 2:
+        return None
+    value, error = state.fit.estimate(path)
+    # A size goes only where the trials do not show it at all: a friction by what nothing carries.
+    if not shape and np.isfinite(error):
         return None
     low, high = limits(problem, state.fit, state.chosen, path)
-    value, error = state.fit.estimate(path)
     doubtful = [
         end
         for end in (low, high)
@@ -141,7 +145,8 @@ def _tied(problem: FitProblem, state: Nested, place: int) -> Nested:
         for whole in _whole_laws(problem, state, simpler, place, tie):
             if not _explains_more(problem, whole, simpler, tie):
                 continue
-            if _is_shown(problem, whole, tie):
+            # A simpler law that is far from the trials gives the other parameters false values.
+            if problem.far(simpler.fit) or _is_shown(problem, whole, tie):
                 state = whole
                 break
             if tie.twin:
