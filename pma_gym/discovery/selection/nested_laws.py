@@ -10,8 +10,8 @@ of readings left out too, and where the parameter that may be equal is surely ab
 not at an end of its range: a static friction of 0 N, or below the dynamic one, borrows the law's
 form for something else. So does one whose Stribeck speed may be the least that there is. Where a
 whole law explains more and its numbers are not surely apart, the interval of the one number holds
-what the whole law says of it; where the one number leaves more than three noises, the whole law
-stays.
+what the whole law says of it; where the one number leaves more than three noises and the whole law
+less, that stays.
 """
 
 from collections.abc import Iterator
@@ -146,7 +146,8 @@ def _tied(problem: FitProblem, state: Nested, place: int) -> Nested:
             if not _explains_more(problem, whole, simpler, tie):
                 continue
             # A simpler law that is far from the trials gives the other parameters false values.
-            if problem.far(simpler.fit) or _is_shown(problem, whole, tie):
+            nearer = problem.far(simpler.fit) and not problem.far(whole.fit)
+            if nearer or _is_shown(problem, whole, tie):
                 state = whole
                 break
             if tie.twin:
