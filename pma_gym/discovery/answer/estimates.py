@@ -8,6 +8,7 @@ from pma_gym.discovery.fitting.fit_problem import Fitted
 from pma_gym.discovery.fitting.free_parameters import at_limit, unit
 from pma_gym.discovery.result.estimates import Estimate, NamedEffect
 from pma_gym.discovery.screening.score_test import ScreeningScore
+from pma_gym.discovery.selection.forward_selection import LEAST_GAIN
 from pma_gym.discovery.selection.stages import Stage
 from pma_gym.discovery.verdict.findings import Findings
 
@@ -53,11 +54,35 @@ def estimate(findings: Findings, fit: Fitted, path: str) -> Estimate:
     if not np.isfinite(error):
         return Estimate(value, None, None, unit(path), limit)
     low, high = fit.interval(path, error)
+    shifts = _shifts_beside(findings, fit, path)
+    low, high = min(low, value + min(shifts)), max(high, value + max(shifts))
     low, high = max(low, lower), min(high, upper)
     # A range may be a million times as wide as what a light axis has: what is surely off an end of
     # it is not at that end.
     limit = "" if lower < low and high < upper else limit
     return Estimate(value, low, high, unit(path), limit)
+
+
+def _shifts_beside(findings: Findings, fit: Fitted, path: str) -> list[float]:
+    """How far a parameter moves where a further effect stands beside the selected ones; and 0.
+
+    What explains more by as much as an added effect must at least, but was not worth a name, may
+    still be there.
+    """
+    selection = findings.selection
+    names = tuple(each.name for each in selection.chosen)
+    if fit is not selection.fit or not names:
+        return [0.0]
+    last = selection.stages[-1]
+    if last.before.names != names or path not in last.before.paths:
+        return [0.0]
+    more = [
+        beside
+        for beside in last.fits.values()
+        if last.before.chi_square - beside.chi_square >= LEAST_GAIN and path in beside.paths
+    ]
+    here = last.before.estimate(path)[0]
+    return [0.0, *(beside.estimate(path)[0] - here for beside in more)]
 
 
 def _bounds(findings: Findings, fit: Fitted) -> Mapping[str, tuple[float, float]]:
