@@ -22,7 +22,7 @@ def fit(chi_square, **values):
     return Fitted(model, names, at, numbers, np.eye(len(at)), chi_square, steps, True)
 
 
-def findings(*beside, named=("drag",)):
+def diagnosed(*beside, named=("drag",)):
     """A drag is named; fits of a friction beside it, in the last round."""
     before = fit(1000.0, mass=5.0, drag=2.0)
     last = SimpleNamespace(before=before, fits=dict(enumerate(beside)))
@@ -34,20 +34,20 @@ def findings(*beside, named=("drag",)):
 
 def test_a_friction_that_explains_more_moves_the_drag_and_the_mass():
     more = fit(1000.0 - LEAST_GAIN, mass=4.8, drag=1.5, friction=0.3)
-    found = findings(more)
-    assert _shifts_beside(found, found.selection.fit, DRAG) == pytest.approx([0.0, -0.5])
-    assert _shifts_beside(found, found.selection.fit, MASS) == pytest.approx([0.0, -0.2])
+    diagnosis = diagnosed(more)
+    assert _shifts_beside(diagnosis, diagnosis.selection.fit, DRAG) == pytest.approx([0.0, -0.5])
+    assert _shifts_beside(diagnosis, diagnosis.selection.fit, MASS) == pytest.approx([0.0, -0.2])
 
 
 def test_what_explains_hardly_more_moves_nothing():
     less = fit(1001.0 - LEAST_GAIN, mass=4.8, drag=1.5, friction=0.3)
-    found = findings(less)
-    assert _shifts_beside(found, found.selection.fit, DRAG) == [0.0]
+    diagnosis = diagnosed(less)
+    assert _shifts_beside(diagnosis, diagnosis.selection.fit, DRAG) == [0.0]
 
 
 def test_a_round_beside_other_effects_says_nothing():
     more = fit(0.0, mass=4.8, drag=1.5, friction=0.3)
-    for found in (findings(more, named=("spring",)), findings(more, named=())):
-        assert _shifts_beside(found, found.selection.fit, DRAG) == [0.0]
-    found = findings(more)
-    assert _shifts_beside(found, fit(990.0, mass=5.1, drag=2.1), DRAG) == [0.0]
+    for diagnosis in (diagnosed(more, named=("spring",)), diagnosed(more, named=())):
+        assert _shifts_beside(diagnosis, diagnosis.selection.fit, DRAG) == [0.0]
+    diagnosis = diagnosed(more)
+    assert _shifts_beside(diagnosis, fit(990.0, mass=5.1, drag=2.1), DRAG) == [0.0]
