@@ -66,8 +66,8 @@ def estimate(findings: Findings, fit: Fitted, path: str) -> Estimate:
 def _shifts_beside(findings: Findings, fit: Fitted, path: str) -> list[float]:
     """How far a parameter moves where a further effect stands beside the selected ones; and 0.
 
-    What explains more by as much as an added effect must at least, but was not worth a name, may
-    still be there.
+    An effect that explains as much as one that is added must, but was not worth a name, may still
+    be there.
     """
     selection = findings.selection
     names = tuple(each.name for each in selection.chosen)

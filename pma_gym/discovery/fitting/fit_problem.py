@@ -33,7 +33,7 @@ CAUGHT, EASIER = 3.0, 10.0
 times smaller the noise is taken for from one fit to the next on the way out."""
 
 ROUNDING = 1e-3
-"""Share of a standard error that a parameter's whole range must be, or trials do not show it."""
+"""The trials do not show a parameter whose whole range is a smaller share of its standard error."""
 
 RUGGED, STIFFER, SUSPECT = "cable.stiffness_n_per_mm", (0.75, 0.9, 1.1, 1.3), 1.3
 """What chi-square is rugged in, at which shares of the given value fits begin from it, and the
@@ -350,7 +350,7 @@ class FitProblem:
 
 
 def _shown(curvature: Array, widths: Array) -> Array:
-    """A curvature without what trials do not show: what is left of that is rounding.
+    """A curvature without the parameters that the trials do not show: theirs is rounding.
 
     Args:
         curvature: half the second derivatives of chi-square, shape (p, p).

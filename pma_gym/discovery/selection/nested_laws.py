@@ -10,8 +10,8 @@ of readings left out too, and where the parameter that may be equal is surely ab
 not at an end of its range: a static friction of 0 N, or below the dynamic one, borrows the law's
 form for something else. So does one whose Stribeck speed may be the least that there is. Where a
 whole law explains more and its numbers are not surely apart, the interval of the one number holds
-what the whole law says of it; where the one number leaves more than three noises and the whole law
-less, that stays.
+what the whole law says of it. Where the one number leaves more than three noises and the whole law
+does not, the whole law stays.
 """
 
 from collections.abc import Iterator

@@ -9,9 +9,11 @@ from scipy.signal import lfilter
 
 from pma_gym.data.trial import Trial
 from pma_gym.discovery.fitting.covariance import LEAST_STRETCHES, clusters, covariance
+from pma_gym.discovery.fitting.fit_problem import _shown
 from pma_gym.discovery.preparation.whitened_residuals import Pieces
 from pma_gym.discovery.screening.candidates import candidate_effects
 from pma_gym.discovery.verdict.homogeneity_test import homogeneity_test, newton_step
+from pma_gym.estimation.least_squares import inverse
 from pma_gym.plant.plant import Plant
 from tests.discovery.laboratory import HYSTERESIS, STATION, commanded, fit_problem, measured
 
@@ -27,6 +29,17 @@ def widened(trials):
     known = np.isfinite(np.diag(fit.covariance))
     wide = covariance(shared, fit, ())
     return np.sqrt(np.diag(wide)[known] / np.diag(fit.covariance)[known])
+
+
+def test_a_parameter_that_shows_by_rounding_alone_leaves_others_their_errors():
+    """Its slopes, of 1e-10, are in proportion to another's."""
+    slopes = np.array([[2.0, 2e-10], [1.0, 1e-10]])
+    curvature, widths = slopes.T @ slopes, np.array([100.0, 100.0])
+    assert np.isinf(np.diag(inverse(curvature))).all()
+    variances = np.diag(inverse(_shown(curvature, widths)))
+    assert variances[0] == pytest.approx(1.0 / 5.0) and np.isinf(variances[1])
+    shown = np.diag([5.0, 1e-3])
+    np.testing.assert_array_equal(_shown(shown, widths), shown)
 
 
 def test_white_noise_hardly_widens_errors():
