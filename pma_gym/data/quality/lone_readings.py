@@ -70,7 +70,7 @@ class LoneReadings:
         """Text of the warning, given the number of all readings."""
         column, number = BY_QUANTITY[self.quantity], sum(int(at.sum()) for at in self.rows.values())
         least = self.least / SI_FACTORS[column.unit]
-        many = "readings stand" if number > 1 else "reading stands"
+        many = "readings stand" if number > 1 else "readings stands"
         return (
             f"{column.name}: {number} of {count} {many} alone, {least:.3g} {column.unit} or more "
             "from the curve through the neighbours: outliers, which count as not measured"
