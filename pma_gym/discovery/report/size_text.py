@@ -10,13 +10,14 @@ from pma_gym.units import suffix, with_unit
 
 def sized_effects(effects: Sequence[NamedEffect]) -> str:
     """Effects, each with its sizes and what it could as well be."""
-    named = []
+    text, joint = "", ""
     for effect in effects:
         sizes = effect_sizes(effect)
         others = effect_names(list(effect.confused_with), "or")
         doubt = f", or {others}" if others else ""
-        named.append(f"{effect_name(effect.name)} ({sizes}){doubt}")
-    return " and ".join(named)
+        text += f"{joint}{effect_name(effect.name)} ({sizes}){doubt}"
+        joint = ", and " if others else " and "
+    return text
 
 
 def effect_sizes(effect: NamedEffect) -> str:
@@ -37,4 +38,4 @@ def _stem(parameter: str, unit_: str) -> str:
     """A parameter's name without its unit: `force` of `force_n`."""
     ending = suffix(unit_)
     stem = parameter.removesuffix(f"_{ending}") if ending else parameter
-    return stem.replace("_", " ")
+    return stem.replace("_", " ").replace("stribeck", "Stribeck")

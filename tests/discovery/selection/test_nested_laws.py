@@ -167,7 +167,7 @@ def test_no_value_is_said_of_what_is_not_determined():
     (effect,) = diagnosis.effects
     assert list(effect.parameters) == ["dynamic_n"]
     assert "static not determined" in diagnosis.sentence
-    assert "stribeck speed not determined" in diagnosis.sentence
+    assert "Stribeck speed not determined" in diagnosis.sentence
     assert "limit" not in diagnosis.sentence
     (written,) = json.loads(diagnosis.text())["effects"]
     assert set(written["not_determined"]) == {"static_n", "stribeck_speed_mm_per_s"}
