@@ -43,8 +43,9 @@ FINER = 41
 CHANCE = 1e-5
 """That noise is taken for a line, for one signal and one frequency."""
 
-LEAST_SIZE = 0.1
-"""Line (rms) in standard deviations of the noise, below which it counts as none."""
+LEAST_SIZE, LEAST_HARMONIC = 0.1, 0.02
+"""Line (rms) in standard deviations of the noise, below which it counts as none; and one beside
+another of the same mains, which repeats for as long as the trial and adds up in autocorrelation."""
 
 
 def with_lines(
@@ -64,16 +65,18 @@ def with_lines(
     lines: list[list[float]] = [[] for _ in noise]
     powers = np.zeros(len(noise))
     for mains in MAINS_HZ:
-        base = _frequency(mains, noise, logged, left)
+        base, named = _frequency(mains, noise, logged, left), [False] * len(noise)
         for harmonic in HARMONICS:
             for channel, each in enumerate(noise):
                 hertz = harmonic * base
                 if any(abs(hertz - other) < 1e-9 for other in lines[channel]):
                     continue
                 size, chance = _line(hertz, logged, [part[channel] for part in left])
-                if chance < CHANCE and size > LEAST_SIZE * each.level:
+                least = LEAST_HARMONIC if named[channel] else LEAST_SIZE
+                if chance < CHANCE and size > least * each.level:
                     lines[channel].append(hertz)
                     powers[channel] += size**2
+                    named[channel] = True
     return tuple(
         _beside_lines(each, lines[channel], powers[channel]) if lines[channel] else each
         for channel, each in enumerate(noise)

@@ -212,6 +212,21 @@ def test_only_mains_and_their_aliases_are_lines() -> None:
     assert all(not each.lines for each in with_lines(_levels(), logged, left)[:CHANNEL])
 
 
+def test_a_small_harmonic_counts_beside_a_line_of_the_same_mains() -> None:
+    """Of 8 % of the noise it adds up over a long trial; alone it is none."""
+    logged, left = _humming([50.0, 50.01] * 2, 70.0)
+    small = 0.08 * np.sqrt(2.0) * LEVEL * np.sin(2.0 * np.pi * 150.0 * logged[0].time)
+    assert with_lines(_levels(), logged, left)[CHANNEL].lines == pytest.approx((50.0,), abs=0.02)
+    beside = [part + small for part in left]
+    lines = with_lines(_levels(), logged, beside)[CHANNEL].lines
+    assert lines == pytest.approx((50.0, 150.0), abs=0.05)
+    rng = np.random.default_rng(8)
+    alone = [
+        np.where(np.isnan(part), part, LEVEL * rng.standard_normal(part.shape)) for part in left
+    ]
+    assert not with_lines(_levels(), logged, [part + small for part in alone])[CHANNEL].lines
+
+
 @pytest.mark.parametrize("phase", [0.0, 0.9])
 def test_pieces_of_a_large_slow_misfit_have_no_lines(phase: float) -> None:
     """A piece of a second ends otherwise than it begins, which has a part at every frequency."""
