@@ -1,7 +1,7 @@
 """Effects whose law is approximate in sentences: what they close, what they leave, and why."""
 
 from pma_gym.discovery.report.effect_text import effect_name, effect_names
-from pma_gym.discovery.report.figure_text import figure, percent
+from pma_gym.discovery.report.figure_text import figure, percent, signal_name
 from pma_gym.discovery.result.estimates import Approximate
 from pma_gym.discovery.verdict.residual_laws import LAWS
 from pma_gym.discovery.verdict.unknown import Reason
@@ -31,6 +31,14 @@ def why_approximate(reason: Reason) -> str:
             f"the size of {effect_name(reason.of)} scatters {scatter(reason)}, "
             f"that of a right law by {limit} at most"
         )
+    elif reason.why in ("misfit", "explained"):
+        floors, name = f"{figure(reason.figure, 2)} noise floors", signal_name(reason.of)
+        found = (
+            f"the misfit of {name} is {floors}"
+            if reason.why == "misfit"
+            else f"a flexible regression explains {floors} of what is left of {name}"
+        )
+        said = f"{found}, of a right law {figure(reason.limit)} at most"
     else:
         quantity, variable, _ = (words.partition(" (")[0] for words in LAWS[reason.of])
         said = (

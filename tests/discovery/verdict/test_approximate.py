@@ -246,6 +246,16 @@ def test_every_reason_says_its_figure_and_its_limit(why):
     assert ("42 %" in said and "12 %" in said) if why != "outdone" else "0.42" in said
 
 
+def test_a_residual_that_is_no_noise_is_said_in_noise_floors():
+    """Where a law closes most of the misfit it is named although more than the noise is left."""
+    misfit = Reason("misfit", 1.63, 1.5, ("joint_friction",), of="angle_deg")
+    said = "the law of joint friction is approximate: the misfit of angle is 1.6 noise floors, "
+    assert why_approximate(misfit) == said + "of a right law 1.5 at most"
+    explained = replace(misfit, why="explained", figure=0.87, limit=0.5)
+    found = "a flexible regression explains 0.87 noise floors of what is left of angle"
+    assert f"{found}, of a right law 0.5 at most" in why_approximate(explained)
+
+
 def test_two_laws_are_both_approximate():
     size = {"force_n": Estimate(8.0, 7.0, 9.0, "N")}
     two = tuple(NamedEffect(name, (), 0.001, size) for name in ("hysteresis", "creep"))
