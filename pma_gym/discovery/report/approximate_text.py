@@ -33,12 +33,12 @@ def why_approximate(reason: Reason) -> str:
         )
     elif reason.why in ("misfit", "explained"):
         floors, name = f"{figure(reason.figure, 2)} noise floors", signal_name(reason.of)
-        found = (
+        figures = (
             f"the misfit of {name} is {floors}"
             if reason.why == "misfit"
             else f"a flexible regression explains {floors} of what is left of {name}"
         )
-        said = f"{found}, of a right law {figure(reason.limit)} at most"
+        said = f"{figures}, of a right law {figure(reason.limit)} at most"
     else:
         quantity, variable, _ = (words.partition(" (")[0] for words in LAWS[reason.of])
         said = (

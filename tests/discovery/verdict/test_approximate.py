@@ -252,8 +252,8 @@ def test_a_residual_that_is_no_noise_is_said_in_noise_floors():
     said = "the law of joint friction is approximate: the misfit of angle is 1.6 noise floors, "
     assert why_approximate(misfit) == said + "of a right law 1.5 at most"
     explained = replace(misfit, why="explained", figure=0.87, limit=0.5)
-    found = "a flexible regression explains 0.87 noise floors of what is left of angle"
-    assert f"{found}, of a right law 0.5 at most" in why_approximate(explained)
+    words = "a flexible regression explains 0.87 noise floors of what is left of angle"
+    assert f"{words}, of a right law 0.5 at most" in why_approximate(explained)
 
 
 def test_two_laws_are_both_approximate():
