@@ -59,6 +59,7 @@ class SimulatedTrials:
         trials: number of trials.
         balanced: whether each of the last parameter values has an equilibrium at the start of
             trials.
+        attempts: steps of the integrator so far; all lanes of a SIMD register count as one.
     Raises:
         ModelError: a path that the model does not have, a row of numbers or a sensor's noise.
         ValueError: no trial, or one without measurements.
@@ -89,7 +90,7 @@ class SimulatedTrials:
             raise ValueError("a fit needs at least one trial")
         self._trials = [Logged.of(self.plant.model, i, trial) for i, trial in enumerate(trials)]
         self.count = sum(logged.count for logged in self._trials)
-        self._buffer = np.empty(0)
+        self._buffer, self.attempts = np.empty(0), 0
         self.balanced: NDArray[np.bool_] = np.ones(1, bool)
         self._own: list[tuple[int, Array]] = []
         self._begun: list[tuple[int, Array]] = []
@@ -155,7 +156,7 @@ class SimulatedTrials:
                 self._batch(i, tables[i], states[i], zeros[i], space)
                 for i, space in zip(block, spaces, strict=True)
             ]
-            simulate_batches(self.plant.program, batches, self.threads)
+            self.attempts += simulate_batches(self.plant.program, batches, self.threads)
             if self._begun:
                 spaces = self._met_freely(block, spaces, zeros, vectors, every, tables)
             elif moved:
@@ -266,7 +267,7 @@ class SimulatedTrials:
             first = np.repeat([logged.first], len(space), axis=0).T
             states, zeros[:] = solver.equilibria_at(self.plant, first[0], first[1], every)
             batch = self._batch(number, tables, states, zeros, space)
-            simulate_batches(self.plant.program, [batch], self.threads)
+            self.attempts += simulate_batches(self.plant.program, [batch], self.threads)
             held, least = self._held(space, zeros, last, logged.channels), met.misfit
             (met,) = initial_states.meet([space], [held], [logged], self._levels, further)
             if not met.misfit < least:

@@ -31,6 +31,7 @@ class CandidateEffect:
         left: paths that left the law because the trials do not determine them (`nested_laws`).
         lowest: least values (file unit) that trials of this way can show, by path, where those are
             above what the catalogue allows.
+        highest: largest values, likewise, where those are below what the catalogue allows.
     """
 
     name: str
@@ -45,6 +46,7 @@ class CandidateEffect:
     own: Mapping[str, Sequence[float]] = field(default_factory=dict)
     left: tuple[str, ...] = ()
     lowest: Mapping[str, float] = field(default_factory=dict)
+    highest: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def fitted_paths(self) -> list[str]:
@@ -56,7 +58,9 @@ class CandidateEffect:
     def bounds(self) -> tuple[Array, Array]:
         """Least and largest values of `paths` in file units, shape (p,) each."""
         lower, upper = bounds(self.paths)
-        return np.maximum(lower, [self.lowest.get(path, -np.inf) for path in self.paths]), upper
+        least = [self.lowest.get(path, -np.inf) for path in self.paths]
+        most = [self.highest.get(path, np.inf) for path in self.paths]
+        return np.maximum(lower, least), np.minimum(upper, most)
 
     def beside(self, model: Model) -> Model:
         """Another model with this effect where it does nothing."""

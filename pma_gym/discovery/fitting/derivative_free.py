@@ -7,10 +7,10 @@ errors wide, wider than the ruggedness, and shrinks to a minimum.
 """
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.optimize import minimize
+from scipy.optimize import OptimizeResult, minimize
 
 from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
 from pma_gym.discovery.fitting.fit_problem import FitProblem, Fitted
@@ -29,6 +29,13 @@ EVALUATIONS = 50
 SIMPLICES = 5
 """Most simplices, each begun where the one before it ended."""
 
+MOST_STEPS = 100_000_000
+"""Steps of the integrator after which no simplex goes on, about twenty seconds of one core: one of
+a stiff contact would take minutes. The fit then has not converged, and the answer says so."""
+
+NARROWER = 0.25
+"""Size of a simplex over that of one that gained nothing: the same again would end the same."""
+
 LEAST_GAIN = 0.01
 """Share of chi-square by which a further simplex must lower it, or it found nothing new."""
 
@@ -46,54 +53,69 @@ def refined(problem: FitProblem, fit: Fitted, chosen: Sequence[CandidateEffect])
     Returns:
         The fit, of no larger chi-square; converged where the last simplex gained nothing.
     """
-    best, converged = fit, False
+    best, converged, size, left = fit, False, 1.0, MOST_STEPS
     for _ in range(SIMPLICES):
-        before, (best, shrunk) = best, _by_simplex(problem, best, chosen)
-        gain = before.chi_square - best.chi_square
-        converged = shrunk and gain < LEAST_GAIN * before.chi_square
-        if converged:
+        ended = _by_simplex(problem, best, chosen, size, left)
+        gain, before = best.chi_square - ended.fit.chi_square, best
+        best, left = ended.fit, left - ended.steps
+        converged = ended.shrunk and gain < LEAST_GAIN * before.chi_square
+        if converged or left <= 0:
             break
+        size = 1.0 if gain > 0.0 else NARROWER * size
     return replace(best, converged=converged)
 
 
+@dataclass(frozen=True)
+class _Ended:
+    """The least that a simplex reached, whether it shrank to it, and the integrator's steps."""
+
+    fit: Fitted
+    shrunk: bool
+    steps: int
+
+
 def _by_simplex(
-    problem: FitProblem, fit: Fitted, chosen: Sequence[CandidateEffect]
-) -> tuple[Fitted, bool]:
-    """The least that one simplex reaches from a fit, and whether it shrank to it."""
+    problem: FitProblem, fit: Fitted, chosen: Sequence[CandidateEffect], size: float, most: int
+) -> _Ended:
+    """What one simplex of a size (1: usual) reaches within so many steps of the integrator."""
     whitened = problem.whitened_at(fit, chosen)
     # Derivatives over moves that show as much as the residual: shorter ones see the ruggedness.
     left = max(1.0, problem.left(fit))
     steps = np.where(fit.values + left * fit.steps > whitened.upper, -left, left) * fit.steps
     curvature = whitened.sums(fit.values, steps).curvature
     if not np.isfinite(curvature).all():
-        return fit, False
+        return _Ended(fit, False, whitened.attempts)
     local = replace(fit, covariance=inverse(curvature), steps=np.abs(steps))
     axes = WIDTH * left * covariance_root(local)
-    least, most = whitened.lower, whitened.upper
 
     def at(moves: np.ndarray) -> np.ndarray:
-        return np.clip(fit.values + axes @ moves, least, most)
+        return np.clip(fit.values + axes @ moves, whitened.lower, whitened.upper)
+
+    def stop_late(intermediate_result: OptimizeResult) -> None:
+        if whitened.attempts > most:
+            raise StopIteration
 
     def chi_square(moves: np.ndarray) -> float:
         sums = whitened.sums(at(moves), np.empty(0))
         return min(sums.chi_square, IMPOSSIBLE)
 
-    size = len(fit.values)
+    count = len(fit.values)
     ended = minimize(
         chi_square,
-        np.zeros(size),
+        np.zeros(count),
         method="Nelder-Mead",
+        callback=stop_late,
         options={
-            "initial_simplex": np.vstack([np.zeros(size), np.eye(size)]),
-            "maxfev": EVALUATIONS * size,
+            "initial_simplex": np.vstack([np.zeros(count), size * np.eye(count)]),
+            "maxfev": EVALUATIONS * count,
             "xatol": NARROW,
             "fatol": left**2,
             "adaptive": True,
         },
     )
     if not ended.fun < fit.chi_square:
-        return fit, bool(ended.success)
+        return _Ended(fit, bool(ended.success), whitened.attempts)
     reached = at(ended.x)
     model = fit.model.replace(dict(zip(fit.paths, reached.tolist(), strict=True)))
     moved = replace(local, model=model, values=reached, chi_square=float(ended.fun))
-    return replace(moved, steps=fit.steps), bool(ended.success)
+    return _Ended(replace(moved, steps=fit.steps), bool(ended.success), whitened.attempts)

@@ -136,11 +136,12 @@ class FitProblem:
             trials: which trials; all if not given.
             reach: how many times as wide as assumed beforehand ranges are, by path.
         """
-        paths, own, lowest = list(self.own.free), {}, {}
+        paths, own, lowest, highest = list(self.own.free), {}, {}, {}
         for candidate in extra:
             paths += candidate.fitted_paths
             own |= candidate.own
             lowest |= candidate.lowest
+            highest |= candidate.highest
         prior = np.full(len(paths), np.inf)
         prior[: len(self.own.prior)] = self.own.prior
         chosen = range(len(self.trials)) if trials is None else trials
@@ -157,6 +158,7 @@ class FitProblem:
             threads=self.threads,
             reach=reach,
             lowest=lowest,
+            highest=highest,
         )
 
     def probed(self, model: Model, candidate: CandidateEffect) -> WhitenedResiduals:
@@ -200,6 +202,15 @@ class FitProblem:
         at = values(model, [free.path for free in whitened.free])
         pieces = whitened.pieces(at, np.empty(0))
         return np.inf if pieces is None else float(pieces.total()[0, 0])
+
+    def steps_a_row(self, model: Model, extra: Sequence[CandidateEffect] = ()) -> float:
+        """Steps of the integrator from one row to the next, in the mean over the trials.
+
+        Those of a free rig's trials that are begun again from a better start count, too.
+        """
+        whitened = self.whitened_residuals(model, extra)
+        whitened.pieces(values(model, [free.path for free in whitened.free]), np.empty(0))
+        return whitened.attempts / sum(len(trial.time) for trial in self.trials)
 
     def left(self, fit: Fitted) -> float:
         """Rms of what a fit leaves, the prior counted, in standard deviations of the noise."""

@@ -80,6 +80,7 @@ class WhitenedResiduals(Residuals):
         tolerance, interpolation, threads: as `Residuals`.
         reach: how many times as wide as assumed beforehand the range of a parameter is, by path.
         lowest: least values (file unit) of parameters that the trials can show, by path.
+        highest: largest values, likewise.
 
     Attributes:
         noise, prior, centre: as given.
@@ -99,12 +100,14 @@ class WhitenedResiduals(Residuals):
         threads: int = 1,
         reach: Mapping[str, float] | None = None,
         lowest: Mapping[str, float] | None = None,
+        highest: Mapping[str, float] | None = None,
     ) -> None:
         super().__init__(model, trials, free, tolerance, interpolation, threads)
         self.noise, self.prior = tuple(noise), np.asarray(prior, float)
         self.centre = self.start.copy() if centre is None else np.asarray(centre, float)
-        shown = np.array([(lowest or {}).get(path, -np.inf) for path in free])
-        self._possible = np.maximum(self.lower, shown), self.upper
+        least = np.array([(lowest or {}).get(path, -np.inf) for path in free])
+        most = np.array([(highest or {}).get(path, np.inf) for path in free])
+        self._possible = np.maximum(self.lower, least), np.minimum(self.upper, most)
         wider = np.array([(reach or {}).get(path, 1.0) for path in free])
         # Beyond lies no rig like this one, and an integrator's hell: a slide of a gram, say.
         self.lower, self.upper = assumed_range(self.centre, self.prior, *self._possible, wider)

@@ -143,7 +143,7 @@ def _lacking(
     own = {f"{effect.name}.{file_keys['repeat']}": list(orders or ())} if counted else {}
     places = {stem: _places(stem, shown[stem], sizes) for stem in shown}
     candidate = _candidate(effect.name, effect, extended, file_keys, shown, own, places)
-    return candidate if sizes is None else _within_way(candidate, sizes)
+    return candidate if sizes is None else _overcome(_within_way(candidate, sizes), sizes)
 
 
 def _within_way(candidate: CandidateEffect, sizes: Sizes) -> CandidateEffect:
@@ -162,6 +162,20 @@ def _within_way(candidate: CandidateEffect, sizes: Sizes) -> CandidateEffect:
     order = np.argsort(first)
     kept = first[order]
     return replace(candidate, lowest=lowest, probes=probes[order], signs=candidate.signs[kept])
+
+
+def _overcome(candidate: CandidateEffect, sizes: Sizes) -> CandidateEffect:
+    """A candidate whose static friction is no larger than what the trials tell from holding."""
+    law = CATALOGUE[candidate.effect]
+    stems = law.names_in_files()
+    quantities = {path: stems[path.partition(".")[2]] for path in candidate.paths}
+    static = [tie[0] for tie in law.ties]
+    highest = {
+        path: sizes.most_static(law.quantities[stem])
+        for path, stem in quantities.items()
+        if stem in static
+    }
+    return replace(candidate, highest=highest) if highest else candidate
 
 
 def _places(stem: str, quantity: Quantity, sizes: Sizes | None) -> tuple[float, ...]:

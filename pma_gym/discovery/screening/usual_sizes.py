@@ -67,6 +67,14 @@ LEAST_PERIODS = 1.25
 too, that is never seen to repeat."""
 
 
+STATIC_SHARE = 2.0
+"""Largest static friction that is looked for, over the strongest force in the trials.
+
+Friction that no force of the trials overcomes holds the rig, however large it is: the trials tell
+no value above the strongest force from another. A fit that goes there meets a contact so stiff that
+it rings at kilohertz, and does not end. Twice, because mass and drive are known to a share only."""
+
+
 @dataclass(frozen=True)
 class Sizes:
     """Sizes in trials (SI).
@@ -76,12 +84,15 @@ class Sizes:
         speed: of the position.
         way: half of the largest.
         pressure: of the trials; 0 where there is none.
+        strongest: force of the drive and force of inertia, the largest of each; infinite where
+            the rig's one inertia is not known.
     """
 
     force: float
     speed: float
     way: float
     pressure: float = 0.0
+    strongest: float = np.inf
 
     def scaled(self, quantity: Quantity) -> Quantity:
         """A quantity with the usual value that the sizes make of it, within its bounds."""
@@ -99,6 +110,11 @@ class Sizes:
         """Least periods (file unit) that the trials' longest way tells from another law."""
         least = quantity.from_si(LEAST_PERIODS / (2.0 * self.way))
         return float(np.clip(least, quantity.lower, quantity.upper))
+
+    def most_static(self, quantity: Quantity) -> float:
+        """Largest static friction (file unit) that the trials tell from one that holds the rig."""
+        most = quantity.from_si(STATIC_SHARE * self.strongest)
+        return float(np.clip(most, quantity.lower, quantity.upper))
 
     def rests(self, quantity: Quantity) -> tuple[float, ...]:
         """Where (file unit) a spring may be relaxed: within the trials' way, and away from it."""
@@ -122,13 +138,27 @@ def sizes(model: Model, trials: Sequence[Trial]) -> Sizes | None:
         return _imposed(model, trials)
     if not model.rig.drive_port:
         return None
-    force = _large([_force(model, trial) for trial in trials])
+    forces = [_force(model, trial) for trial in trials]
+    force = _large(forces)
     read = [path for trial in trials if (path := _path(model, trial)) is not None]
     if not read:
         return None
     way = 0.5 * max(float(np.ptp(values)) for _, values in read)
     speed = _large([_speeds(*each) for each in read])
-    return Sizes(force, speed, way) if min(force, speed, way) > 0.0 else None
+    if not min(force, speed, way) > 0.0:
+        return None
+    strongest = max(float(np.abs(each).max()) for each in forces)
+    return Sizes(force, speed, way, strongest=strongest + _largest_inertial(model, read))
+
+
+def _largest_inertial(model: Model, read: Sequence[tuple[np.ndarray, np.ndarray]]) -> float:
+    """Largest force of inertia: what a rig that falls without a drive is moved by."""
+    if not model.rig.inertia:
+        return np.inf
+    part, name = model.rig.inertia
+    changes = [_changes(*each) for each in read]
+    largest = max(float(np.abs(each).max(initial=0.0)) for each in changes)
+    return float(getattr(model.parameters[part], name)) * largest
 
 
 def _imposed(model: Model, trials: Sequence[Trial]) -> Sizes | None:
@@ -185,3 +215,9 @@ def _force(model: Model, trial: Trial) -> np.ndarray:
 def _speeds(time: np.ndarray, values: np.ndarray) -> np.ndarray:
     rows = max(1, round(SMOOTH_S / float(np.median(np.diff(time)))))
     return (values[rows:] - values[:-rows]) / (time[rows:] - time[:-rows])
+
+
+def _changes(time: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Rates of the speeds: accelerations."""
+    speeds = _speeds(time, values)
+    return _speeds(0.5 * (time[len(time) - len(speeds) :] + time[: len(speeds)]), speeds)

@@ -11,7 +11,7 @@ not at an end of its range: a static friction of 0 N, or below the dynamic one, 
 form for something else. So does one whose Stribeck speed may be the least that there is. Where a
 whole law explains more and its numbers are not surely apart, the interval of the one number holds
 what the whole law says of it. Where the one number leaves more than three noises and the whole law
-does not, the whole law stays.
+does not, or twice the residual, the whole law stays.
 """
 
 from collections.abc import Iterator
@@ -42,6 +42,9 @@ FLAT = 4.0
 
 UNSURE = 3.0
 """Standard errors within which a limit, or a parameter that may be equal, makes one doubtful."""
+
+FAR_NEARER = 4.0
+"""How many times less chi-square a whole law leaves that stays in any case: half the residual."""
 
 HALVINGS = 5
 """How often the place where a profile leaves its flat is halved."""
@@ -146,7 +149,8 @@ def _tied(problem: FitProblem, state: Nested, place: int) -> Nested:
             if not _explains_more(problem, whole, simpler, tie):
                 continue
             # A simpler law that is far from the trials gives the other parameters false values.
-            nearer = problem.far(simpler.fit) and not problem.far(whole.fit)
+            nearer = whole.fit.chi_square * FAR_NEARER < simpler.fit.chi_square
+            nearer |= problem.far(simpler.fit) and not problem.far(whole.fit)
             if nearer or _is_shown(problem, whole, tie):
                 state = whole
                 break

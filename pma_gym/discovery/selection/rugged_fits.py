@@ -6,8 +6,8 @@ where it begins. The law then enters as one number first, the simpler law within
 begins a little above that, at several values of what does nothing there (a Stribeck speed). Errors
 of force lead a free rig away with the square of time, so these fits are made to short pieces of its
 trials, in which chi-square is smoother; those of other rigs are eased (`FitProblem.eased_fit`). The
-best are fitted to the trials and refined without derivatives. All that explain the trials about as
-well as the best say how well the parameters are known.
+best are refined without derivatives, fitted to the trials and refined there. All that explain the
+trials about as well as the best say how well the parameters are known.
 """
 
 from collections.abc import Iterator, Sequence
@@ -84,10 +84,14 @@ def best_of_optima(
         problem: the trials.
         fit: a fit that did not converge; one of the starts.
         chosen: the effects in it.
-        refines: whether the best fits are refined without derivatives, which takes longest.
+        refines: whether the best fits to the trials are refined without derivatives, which takes
+            longest; those to short pieces always are.
     """
     smooth = in_short_pieces(problem) if problem.given.rig.is_free else problem
     begun = sorted(_fits_from_simpler_laws(smooth, fit, chosen), key=_chi_square)
+    if smooth.wholes:
+        begun[:REFINED] = [refined(smooth, each, chosen) for each in begun[:REFINED]]
+        begun.sort(key=_chi_square)
     fits = [fit, *filter(None, (problem.fit(each.model, chosen) for each in begun[:FITTED]))]
     fits.sort(key=_chi_square)
     if refines:

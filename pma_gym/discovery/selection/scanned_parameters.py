@@ -23,6 +23,11 @@ LADDER = (10.0, 10.0**0.5)
 ROUNDED = 1.0 + 1e-9
 """How much within its bounds a value stays."""
 
+MOST_STEPS = 100.0
+"""Most steps of the integrator from one reading to the next. A contact that takes more rings faster
+than any reading shows, and each of its fits takes minutes: a log of five seconds at 500 Hz had no
+answer after fifteen."""
+
 FAR_NEARER = 4.0
 """How many times less chi-square must be far from the trials: a residual half as large."""
 
@@ -102,6 +107,8 @@ def _climbed(
             return chosen, fit
         moved = tuple(_at(each, path, there) if each.name == name else each for each in chosen)
         begun = replace(fit, model=fit.model.replace({path: there}))
+        if factor < 1.0 and problem.steps_a_row(begun.model, moved) > MOST_STEPS:
+            return chosen, fit
         new = refit(problem, begun, moved, journal, f"{path} {there}")
         worth = 2.0 * COST * max(1.0, problem.left(fit) ** 2)
         if fit.chi_square - new.chi_square < worth:

@@ -89,6 +89,7 @@ JOINT = Rig(
     has_muscle=False,
     is_diagnosable=True,
     drive_port="joint_drive",
+    inertia=("inertia", "inertia"),
     moving_lags={"lag_encoder": "spin"},
     direct_commands={"torque_drive": "torque_command", "dc_motor": "winding_voltage"},
 )

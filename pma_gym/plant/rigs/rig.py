@@ -42,6 +42,7 @@ class Rig:
         start_paths: parameters of a free rig's initial state, keyed by the state: position, then
             speed.
         drive_port: port of the drive whose force moves a free rig.
+        inertia: part and field of what the net force accelerates; empty where no one part is that.
         imposes_motion: whether the drive follows a record of positions and the force is an output.
         direct_commands: for each drive, the command in SI that it takes without a voltage
             calibration.
@@ -63,6 +64,7 @@ class Rig:
     has_muscle: bool = True
     is_diagnosable: bool = False
     drive_port: str = ""
+    inertia: tuple[str, ...] = ()
     imposes_motion: bool = False
     needed_ports: Mapping[str, str] = field(default_factory=dict)
     modifying_ports: tuple[str, ...] = ()

@@ -120,5 +120,6 @@ SLIDE = Rig(
     has_muscle=False,
     is_diagnosable=True,
     drive_port="two_way_drive",
+    inertia=("slide", "mass"),
     moving_lags={"lag_lvdt": "velocity"},
 )

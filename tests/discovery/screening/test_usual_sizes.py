@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from pma_gym.data.trial import Trial
+from pma_gym.discovery.fitting.candidate_effect import bounds
 from pma_gym.discovery.fitting.fit_problem import FitProblem
 from pma_gym.discovery.fitting.free_parameters import FreeParameters
 from pma_gym.discovery.preparation.noise import white_noise
@@ -125,3 +126,52 @@ def test_a_ripple_is_found_at_any_phase(start, phase):
     fit = problem.fit(imposed(), (ripple,), {"cogging": begun})
     assert fit is not None
     assert fit.estimate("cogging.phase_deg")[0] == pytest.approx(phase, abs=1.0)
+
+
+def highest_static(trials):
+    (friction,) = (
+        each for each in candidate_effects(joint(), None, trials) if each.name == "joint_friction"
+    )
+    return friction.bounds[1][friction.paths.index("joint_friction.static_n_m")]
+
+
+@pytest.mark.parametrize("factor", [1e-3, 1.0])
+def test_no_static_friction_is_looked_for_that_nothing_in_the_trials_overcomes(factor):
+    """Twice the torque of the drive and of inertia, whose sines have known peaks."""
+    trial = swung(0.5 * factor, 0.3 * factor)
+    inertia = joint().parameters["inertia"].inertia
+    strongest = factor * (0.5 + inertia * 0.3 * (4.0 * np.pi) ** 2)
+    assert highest_static([trial]) == pytest.approx(2.0 * strongest, rel=0.03)
+
+
+def test_a_joint_that_falls_without_a_drive_may_have_friction():
+    falling = swung(1e-9, 0.3)
+    inertia = joint().parameters["inertia"].inertia
+    least = inertia * 0.3 * (4.0 * np.pi) ** 2
+    assert highest_static([falling]) == pytest.approx(2.0 * least, rel=0.03)
+
+
+def test_a_rig_whose_inertia_is_not_one_part_bounds_no_friction():
+    """A station's rotor and slide move on a cable: the catalogue's bounds are all there are."""
+    station = load_model("station")
+    for each in candidate_effects(station, None, []):
+        np.testing.assert_array_equal(each.bounds, bounds(each.paths))
+
+
+def test_a_fit_keeps_to_static_friction_that_the_trials_overcome():
+    """A joint that stands still under its drive: any larger friction holds it as well."""
+    time = np.linspace(0.0, 2.0, 401)
+    wave = 0.5 * np.sin(2.0 * np.pi * time)
+    rng = np.random.default_rng(4)
+    still = Trial(time, {"torque_command": wave}, {"angle": 1e-3 * rng.standard_normal(401)})
+    trials = [still, swung(0.5, 0.3)]
+    (friction,) = (
+        each for each in candidate_effects(joint(), None, trials) if each.name == "joint_friction"
+    )
+    problem = FitProblem(
+        [still], joint(), FreeParameters((), np.empty(0)), (white_noise(1e-3), white_noise(1.0))
+    )
+    most = highest_static(trials)
+    fit = problem.fit(joint(), (friction,), {"joint_friction": friction.probes[0]})
+    assert fit is not None
+    assert fit.estimate("joint_friction.static_n_m")[0] <= most < 1e4

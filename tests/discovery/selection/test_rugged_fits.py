@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from pma_gym.data.datasets.dataset import NamedTrial
+from pma_gym.discovery.fitting import derivative_free
 from pma_gym.discovery.fitting.derivative_free import refined
 from pma_gym.discovery.fitting.fit_problem import FitProblem
 from pma_gym.discovery.fitting.free_parameters import free_parameters
@@ -81,6 +82,39 @@ def test_a_refined_fit_explains_more_and_says_what_it_explains():
     assert refit.chi_square < fit.chi_square
     again = problem.whitened_at(refit, (DRY,)).sums(refit.values, np.empty(0))
     assert refit.chi_square == pytest.approx(again.chi_square, rel=1e-9)
+
+
+def test_a_simplex_that_gains_nothing_is_followed_by_a_narrower_one(monkeypatch):
+    """The same again ends the same: the second begins a quarter as wide, and shrinks."""
+    problem = problem_of(driven_slide(12.0, lanes=2, seconds=0.5, rate=100))
+    fit = fit_from(problem, 14.0, 12.0, 10.0)
+    sizes = []
+
+    def by_simplex(problem, fit, chosen, size, most):
+        sizes.append(size)
+        gains = len(sizes) == 2
+        reached = replace(fit, chi_square=0.5 * fit.chi_square) if gains else fit
+        return derivative_free._Ended(reached, len(sizes) == 4, 1)
+
+    monkeypatch.setattr(derivative_free, "_by_simplex", by_simplex)
+    assert refined(problem, fit, (DRY,)).converged
+    assert sizes == [1.0, 0.25, 1.0, 0.25]
+
+
+def test_simplices_of_a_stiff_contact_stop_and_say_so(monkeypatch):
+    problem = problem_of(driven_slide(12.0, lanes=2, seconds=0.5, rate=100))
+    fit = fit_from(problem, 14.0, 12.0, 10.0)
+    whole = refined(problem, fit, (DRY,))
+    monkeypatch.setattr(derivative_free, "MOST_STEPS", 20_000)
+    begun, simulated = [], FitProblem.whitened_at
+    monkeypatch.setattr(
+        FitProblem, "whitened_at", lambda *given: begun.append(simulated(*given)) or begun[-1]
+    )
+    short = refined(problem, fit, (DRY,))
+    assert not short.converged
+    assert whole.chi_square < short.chi_square <= fit.chi_square
+    # No simulation is begun once the steps are spent.
+    assert 20_000 < sum(each.attempts for each in begun) < 22_000
 
 
 def test_short_pieces_begin_where_the_slide_moves_fastest():

@@ -12,6 +12,7 @@ from pma_gym.discovery.fitting.journal import Journal
 from pma_gym.discovery.preparation.noise import white_noise
 from pma_gym.discovery.preparation.prepared_trials import prepared
 from pma_gym.discovery.screening.candidates import candidate_effects
+from pma_gym.discovery.selection import scanned_parameters
 from pma_gym.discovery.selection.scanned_parameters import with_scanned
 from pma_gym.effects import CATALOGUE
 from pma_gym.plant.model import Model
@@ -68,6 +69,16 @@ def test_a_contact_stiffer_than_usual_is_found_by_a_ladder(stiff_contact):
     assert best.estimate("joint_friction.dynamic_n_m")[0] == pytest.approx(5.0, rel=0.05)
     # A fit that begins without the effect gets the same contact.
     assert values(moved.beside(problem.given), [PRESLIDING])[0] == values(best.model, [PRESLIDING])
+
+
+def test_no_contact_is_tried_that_rings_faster_than_any_reading_shows(stiff_contact, monkeypatch):
+    problem, dry, fit = stiff_contact
+    here = problem.steps_a_row(fit.model, (dry,))
+    stiffer = fit.model.replace({PRESLIDING: 0.1 * values(fit.model, [PRESLIDING])[0]})
+    assert 0.0 < here < problem.steps_a_row(stiffer, (dry,))
+    monkeypatch.setattr(scanned_parameters, "MOST_STEPS", here)
+    _, best = with_scanned(problem, fit, (dry,), Journal(None, [], problem.given, ""))
+    assert values(best.model, [PRESLIDING])[0] >= values(fit.model, [PRESLIDING])[0]
 
 
 def test_what_is_scanned_is_held():
