@@ -13,6 +13,10 @@ from pma_gym.units import TURN_DEG, Quantity
 Array = NDArray[np.float64]
 
 
+ABSENT = 1e-6
+"""Share of the largest size that is looked for, at or below which a size is none."""
+
+
 @dataclass(frozen=True)
 class CandidateEffect:
     """One effect that may be missing.
@@ -61,6 +65,16 @@ class CandidateEffect:
         least = [self.lowest.get(path, -np.inf) for path in self.paths]
         most = [self.highest.get(path, np.inf) for path in self.paths]
         return np.maximum(lower, least), np.minimum(upper, most)
+
+    def is_absent(self, model: Model) -> bool:
+        """Whether a model has this effect with every size where it does nothing."""
+        here = np.array(
+            [model.values_in_files(self.effect)[path.partition(".")[2]] for path in self.paths]
+        )
+        reach = np.abs(self.probes - self.absent).max(axis=0)
+        sizes = self.amplitudes & (reach > 0.0)
+        near = np.abs(here - self.absent) <= ABSENT * reach
+        return bool(sizes.any() and near[sizes].all())
 
     def beside(self, model: Model) -> Model:
         """Another model with this effect where it does nothing."""

@@ -72,7 +72,8 @@ STATIC_SHARE = 2.0
 
 Friction that no force of the trials overcomes holds the rig, however large it is: the trials tell
 no value above the strongest force from another. A fit that goes there meets a contact so stiff that
-it rings at kilohertz, and does not end. Twice, because mass and drive are known to a share only."""
+it rings a thousand times a second, and does not end. Twice, because mass and drive are known to a
+share only."""
 
 
 @dataclass(frozen=True)

@@ -339,6 +339,20 @@ def _once(
     return searched
 
 
+def without_absent(
+    problem: FitProblem, fit: Fitted, chosen: tuple[CandidateEffect, ...]
+) -> tuple[tuple[CandidateEffect, ...], Fitted]:
+    """The effects less those whose sizes a fit ended with at nothing, and the fit of the others."""
+    others = tuple(each for each in chosen if not each.is_absent(fit.model))
+    if len(others) == len(chosen) or not others:
+        return chosen, fit
+    names = {each.effect for each in chosen} - {each.effect for each in others}
+    kept = {name: table for name, table in fit.model.parameters.items() if name not in names}
+    less = replace(fit.model, parameters=kept)
+    refitted = problem.fit(less, others)
+    return (chosen, fit) if refitted is None else (others, replace(refitted, spread=fit.spread))
+
+
 def without_idle(
     problem: FitProblem,
     best: Fitted,

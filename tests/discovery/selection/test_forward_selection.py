@@ -10,16 +10,18 @@ from pma_gym.data.trial import Trial
 from pma_gym.discovery.fitting.fit_problem import FitProblem
 from pma_gym.discovery.fitting.free_parameters import free_parameters
 from pma_gym.discovery.fitting.journal import Journal
+from pma_gym.discovery.preparation.noise import white_noise
 from pma_gym.discovery.screening.candidates import candidate_effects
 from pma_gym.discovery.screening.residuals import is_autocorrelated, scan_of_fit
 from pma_gym.discovery.screening.score_test import ScreeningScore
 from pma_gym.discovery.selection import stages
-from pma_gym.discovery.selection.candidate_fits import cost
+from pma_gym.discovery.selection.candidate_fits import cost, without_absent
 from pma_gym.discovery.selection.forward_selection import select
 from pma_gym.discovery.selection.kept_fits import kept_form, restored
 from pma_gym.discovery.selection.stages import ALARM, passes
 from pma_gym.plant.plant import Plant
 from tests.discovery.laboratory import HYSTERESIS, OFF, STATION, commanded, fit_problem, laboratory
+from tests.discovery.test_joint import joint
 
 CANDIDATES = candidate_effects(STATION)
 
@@ -221,3 +223,27 @@ def test_in_pieces_of_one_file_a_smaller_change_counts(change, whole, pieces):
     problem = FitProblem(trials, STATION, own, (), files=("one", "other"))
     assert passes(problem, score) == bool(whole)
     assert passes(replace(problem, files=("one", "one")), score) == bool(pieces)
+
+
+def test_an_effect_that_ended_at_nothing_is_not_named():
+    """A fit may leave the size of an earlier effect at zero once a later one is there."""
+    swing = np.linspace(0.0, 2.0, 401)
+    torque = 0.5 * np.sin(2.0 * np.pi * swing)
+    damped = joint().with_effects({"joint_drag": {"coefficient_n_m_s2": 0.02}})
+    trial = Plant(damped).simulate(Trial(swing, {"torque_command": torque}), noise=False)
+    trial = Trial(swing, trial.commands, {"angle": trial.measurements["angle"]})
+    known = {each.name: each for each in candidate_effects(joint(), None, [trial])}
+    chosen = (known["joint_spring"], known["joint_drag"])
+    noise = (white_noise(1e-4), white_noise(1.0))
+    problem = FitProblem([trial], joint(), free_parameters(joint()), noise)
+    fit = problem.fit(joint(), chosen, {"joint_spring": np.array([1e-16, 0.0])})
+    assert fit is not None
+    at = fit.paths.index("joint_spring.stiffness_n_m_per_rad")
+    ended = replace(fit, model=fit.model.replace({fit.paths[at]: 1e-16}))
+    assert ended.model.parameters.keys() >= {"joint_spring", "joint_drag"}
+    others, left = without_absent(problem, ended, chosen)
+    assert [each.name for each in others] == ["joint_drag"]
+    assert "joint_spring" not in left.model.parameters and fit.paths[at] not in left.paths
+    assert left.estimate("joint_drag.coefficient_n_m_s2")[0] == pytest.approx(0.02, rel=0.01)
+    # What has a size stays, and so does a fit in which all have one.
+    assert without_absent(problem, left, others) == (others, left)
