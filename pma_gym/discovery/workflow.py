@@ -12,6 +12,7 @@ from pma_gym.data.trial_columns import TrialError
 from pma_gym.discovery.answer.diagnosis_from_findings import diagnosis_from_findings
 from pma_gym.discovery.diagnosis import Diagnosis
 from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
+from pma_gym.discovery.fitting.covariance import covariance
 from pma_gym.discovery.fitting.fast_motion import with_fast_motion
 from pma_gym.discovery.fitting.fit_problem import FitProblem, Fitted
 from pma_gym.discovery.fitting.free_parameters import free_parameters
@@ -34,6 +35,7 @@ from pma_gym.discovery.selection.backward_elimination import (
     as_given,
     backward_elimination,
 )
+from pma_gym.discovery.selection.candidate_fits import without_absent
 from pma_gym.discovery.selection.forward_selection import Selection, select
 from pma_gym.discovery.selection.nested_laws import nested
 from pma_gym.discovery.selection.rivals import rivals
@@ -252,8 +254,18 @@ class _Work:
         if not selection.chosen:
             return selection
         # Where all is determined it takes milliseconds, else a few fits: no step of its own.
-        less = nested(selection.problem, selection.fit, selection.chosen)
-        return replace(selection, chosen=less.chosen, fit=less.fit, undetermined=less.undetermined)
+        problem = selection.problem
+        less = nested(problem, selection.fit, selection.chosen)
+        chosen, fit = without_absent(problem, less.fit, less.chosen)
+        if fit is not less.fit:
+            fit = replace(fit, covariance=covariance(problem, fit, chosen))
+        effects = {each.effect for each in chosen}
+        undetermined = {
+            path: known
+            for path, known in less.undetermined.items()
+            if path.partition(".")[0] in effects
+        }
+        return replace(selection, chosen=chosen, fit=fit, undetermined=undetermined)
 
     def _confirmed(self, findings: Findings) -> Findings:
         """With rivals of each effect, and how it fares on trials that it was not fitted to."""

@@ -165,15 +165,16 @@ def _within_way(candidate: CandidateEffect, sizes: Sizes) -> CandidateEffect:
 
 
 def _overcome(candidate: CandidateEffect, sizes: Sizes) -> CandidateEffect:
-    """A candidate whose static friction is no larger than what the trials tell from holding."""
+    """A candidate whose dry friction is no larger than what the trials tell from holding."""
     law = CATALOGUE[candidate.effect]
     stems = law.names_in_files()
     quantities = {path: stems[path.partition(".")[2]] for path in candidate.paths}
-    static = [tie[0] for tie in law.ties]
+    # The static friction and the dynamic one, which is no larger.
+    limited = {stem for tie in law.ties for stem in tie[:2]}
     highest = {
-        path: sizes.most_static(law.quantities[stem])
+        path: sizes.most_friction(law.quantities[stem])
         for path, stem in quantities.items()
-        if stem in static
+        if stem in limited
     }
     return replace(candidate, highest=highest) if highest else candidate
 

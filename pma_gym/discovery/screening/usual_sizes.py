@@ -67,6 +67,9 @@ LEAST_PERIODS = 1.25
 too, that is never seen to repeat."""
 
 
+LARGEST = 0.99
+"""The same of an acceleration's peaks: the last hundredth may be readings that stand alone."""
+
 STATIC_SHARE = 2.0
 """Largest static friction that is looked for, over the strongest force in the trials.
 
@@ -112,8 +115,8 @@ class Sizes:
         least = quantity.from_si(LEAST_PERIODS / (2.0 * self.way))
         return float(np.clip(least, quantity.lower, quantity.upper))
 
-    def most_static(self, quantity: Quantity) -> float:
-        """Largest static friction (file unit) that the trials tell from one that holds the rig."""
+    def most_friction(self, quantity: Quantity) -> float:
+        """Largest dry friction (file unit) that the trials tell from one that holds the rig."""
         most = quantity.from_si(STATIC_SHARE * self.strongest)
         return float(np.clip(most, quantity.lower, quantity.upper))
 
@@ -157,8 +160,8 @@ def _largest_inertial(model: Model, read: Sequence[tuple[np.ndarray, np.ndarray]
     if not model.rig.inertia:
         return np.inf
     part, name = model.rig.inertia
-    changes = [_changes(*each) for each in read]
-    largest = max(float(np.abs(each).max(initial=0.0)) for each in changes)
+    changes = [np.abs(_changes(*each)) for each in read]
+    largest = max(float(np.quantile(each, LARGEST)) if each.size else 0.0 for each in changes)
     return float(getattr(model.parameters[part], name)) * largest
 
 

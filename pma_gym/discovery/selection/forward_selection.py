@@ -25,7 +25,6 @@ from pma_gym.discovery.selection.candidate_fits import (
     carries_the_rest,
     cost,
     refit,
-    without_absent,
     without_idle,
 )
 from pma_gym.discovery.selection.exchanged_effects import Round, exchanged
@@ -105,7 +104,6 @@ def select(
     chosen, fit = with_scanned(problem, fit, chosen, journal)
     if is_rugged(fit, chosen):
         fit = settled(problem, replace(fit, spread=best.spread), chosen)
-    chosen, fit = without_absent(problem, fit, chosen)
     fit = replace(fit, covariance=covariance(problem, fit, chosen))
     return Selection(added.stages, chosen, fit, problem, refitted)
 

@@ -198,7 +198,8 @@ def _simpler(
 ) -> Fitted | None:
     """A fit of the simpler law of an effect, about as well as a start needs."""
     idle = idle_values(chosen[place], tie, IDLE_SHARE)
-    size = fit.estimate(tie.twin)[0]
+    # Where the first is below its twin, the twin may be what a law far above all speeds tends to.
+    size = min(fit.estimate(tie.twin)[0], fit.estimate(tie.path)[0])
     simpler = fit
     for _ in range(TIED):
         state = Nested(chosen, simpler, {})
@@ -215,8 +216,9 @@ def _simpler(
 def _starts(candidate: CandidateEffect, tie: Tie, simpler: Fitted) -> Iterator[dict[str, float]]:
     """Values a little off the simpler law."""
     size = simpler.estimate(tie.twin)[0]
+    most = float(candidate.bounds[1][candidate.paths.index(tie.path)])
     for above, share in STARTS:
-        yield {tie.path: above * size} | idle_values(candidate, tie, share)
+        yield {tie.path: min(above * size, most)} | idle_values(candidate, tie, share)
 
 
 def _equals(problem: FitProblem, fits: Sequence[Fitted], chosen: Chosen) -> list[Fitted]:

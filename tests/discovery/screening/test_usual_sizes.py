@@ -132,7 +132,12 @@ def highest_static(trials):
     (friction,) = (
         each for each in candidate_effects(joint(), None, trials) if each.name == "joint_friction"
     )
-    return friction.bounds[1][friction.paths.index("joint_friction.static_n_m")]
+    static, dynamic = (
+        friction.bounds[1][friction.paths.index(f"joint_friction.{stem}_n_m")]
+        for stem in ("static", "dynamic")
+    )
+    assert dynamic == static
+    return static
 
 
 @pytest.mark.parametrize("factor", [1e-3, 1.0])
@@ -142,6 +147,14 @@ def test_no_static_friction_is_looked_for_that_nothing_in_the_trials_overcomes(f
     inertia = joint().parameters["inertia"].inertia
     strongest = factor * (0.5 + inertia * 0.3 * (4.0 * np.pi) ** 2)
     assert highest_static([trial]) == pytest.approx(2.0 * strongest, rel=0.03)
+
+
+def test_readings_that_stand_alone_raise_no_bound():
+    trial = swung(0.5, 0.3)
+    angle = trial.measurements["angle"].copy()
+    angle[[100, 300]] += 0.5
+    spoilt = Trial(trial.time, trial.commands, {"angle": angle})
+    assert highest_static([spoilt]) == pytest.approx(highest_static([trial]), rel=0.1)
 
 
 def test_a_joint_that_falls_without_a_drive_may_have_friction():

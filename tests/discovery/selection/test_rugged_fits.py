@@ -68,6 +68,17 @@ def test_more_beginnings_are_tried_where_the_whole_law_explains_more(least, begu
     assert len(list(rugged_fits._fits_from_simpler_laws(problem, fit, (DRY,)))) == begun
 
 
+def test_no_start_lies_beyond_what_is_looked_for():
+    """Friction of 9590 N m began at 1.1 times that: the catalogue ends at 10000, and no answer."""
+    problem = problem_of(driven_slide(12.0, lanes=1, seconds=0.3, rate=100))
+    fit = fit_from(problem, 14.0, 12.0, 5.0)
+    (tie,) = rugged_fits.ties(DRY)
+    size = fit.estimate(DYNAMIC)[0]
+    bounded = replace(DRY, highest={STATIC: 1.2 * size, DYNAMIC: 1.2 * size})
+    begun = [start[STATIC] for start in rugged_fits._starts(bounded, tie, fit)]
+    assert max(begun) == pytest.approx(1.2 * size) and min(begun) == pytest.approx(1.1 * size)
+
+
 def test_a_law_that_one_number_takes_the_place_of_is_not_refined():
     problem = problem_of(driven_slide(12.0, lanes=2, seconds=0.5, rate=100))
     fit = fit_from(problem, 14.0, 12.0, 10.0)
