@@ -72,7 +72,9 @@ class CandidateEffect:
             [model.values_in_files(self.effect)[path.partition(".")[2]] for path in self.paths]
         )
         reach = np.abs(self.probes - self.absent).max(axis=0)
-        sizes = self.amplitudes & (reach > 0.0)
+        # A time has no value at which it does nothing.
+        neutral = np.array([_quantity(path).neutral is not None for path in self.paths])
+        sizes = self.amplitudes & neutral & (reach > 0.0)
         near = np.abs(here - self.absent) <= ABSENT * reach
         return bool(sizes.any() and near[sizes].all())
 

@@ -346,7 +346,9 @@ def without_absent(
     others = tuple(each for each in chosen if not each.is_absent(fit.model))
     if len(others) == len(chosen) or not others:
         return chosen, fit
-    names = {each.effect for each in chosen} - {each.effect for each in others}
+    # What the model had when it was given stays in it.
+    stay = {each.effect for each in others} | problem.given.parameters.keys()
+    names = {each.effect for each in chosen} - stay
     kept = {name: table for name, table in fit.model.parameters.items() if name not in names}
     less = replace(fit.model, parameters=kept)
     refitted = problem.fit(less, others)

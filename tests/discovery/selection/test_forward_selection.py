@@ -21,6 +21,7 @@ from pma_gym.discovery.selection.kept_fits import kept_form, restored
 from pma_gym.discovery.selection.stages import ALARM, passes
 from pma_gym.plant.plant import Plant
 from tests.discovery.laboratory import HYSTERESIS, OFF, STATION, commanded, fit_problem, laboratory
+from tests.discovery.screening.test_usual_sizes import swung
 from tests.discovery.test_joint import joint
 
 CANDIDATES = candidate_effects(STATION)
@@ -247,3 +248,12 @@ def test_an_effect_that_ended_at_nothing_is_not_named():
     assert left.estimate("joint_drag.coefficient_n_m_s2")[0] == pytest.approx(0.02, rel=0.01)
     # What has a size stays, and so does a fit in which all have one.
     assert without_absent(problem, left, others) == (others, left)
+
+
+def test_a_time_at_its_usual_value_is_no_effect_at_nothing():
+    trial = swung(0.5, 0.3)
+    absent = {
+        each.name: each.is_absent(each.model) for each in candidate_effects(joint(), None, [trial])
+    }
+    times = {"drive_delay", "drive_lag", "encoder_delay", "encoder_lag"}
+    assert {name for name, none in absent.items() if not none} == times
