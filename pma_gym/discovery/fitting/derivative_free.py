@@ -43,13 +43,17 @@ IMPOSSIBLE = 1e300
 """Chi-square where the model cannot be simulated."""
 
 
-def refined(problem: FitProblem, fit: Fitted, chosen: Sequence[CandidateEffect]) -> Fitted:
+def refined(
+    problem: FitProblem, fit: Fitted, chosen: Sequence[CandidateEffect], narrows: bool = False
+) -> Fitted:
     """Refine a fit by simplices until a further one gains nothing.
 
     Args:
         problem: the trials.
         fit: where the first simplex begins.
         chosen: the effects in it.
+        narrows: whether a simplex that gains nothing is followed by a narrower one, in place of
+            being the last.
     Returns:
         The fit, of no larger chi-square; converged where the last simplex gained nothing.
     """
@@ -59,7 +63,7 @@ def refined(problem: FitProblem, fit: Fitted, chosen: Sequence[CandidateEffect])
         gain, before = best.chi_square - ended.fit.chi_square, best
         best, left = ended.fit, left - ended.steps
         converged = ended.shrunk and gain < LEAST_GAIN * before.chi_square
-        if converged or left <= 0:
+        if converged or left <= 0 or not (narrows or gain > 0.0):
             break
         size = 1.0 if gain > 0.0 else NARROWER * size
     return replace(best, converged=converged)

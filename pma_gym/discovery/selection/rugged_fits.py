@@ -164,7 +164,7 @@ def settled(problem: FitProblem, fit: Fitted, chosen: Chosen) -> Fitted:
     """
     if all(below_twin(fit, tie) for candidate in chosen for tie in ties(candidate)):
         return fit
-    refit = refined(problem, fit, chosen)
+    refit = refined(problem, fit, chosen, narrows=True)
     if refit.converged or problem.left(refit) < AT_NOISE:
         return refit
     return best_of_optima(problem, refit, chosen)

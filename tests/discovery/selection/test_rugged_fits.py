@@ -108,8 +108,11 @@ def test_a_simplex_that_gains_nothing_is_followed_by_a_narrower_one(monkeypatch)
         return derivative_free._Ended(reached, len(sizes) == 4, 1)
 
     monkeypatch.setattr(derivative_free, "_by_simplex", by_simplex)
-    assert refined(problem, fit, (DRY,)).converged
+    assert refined(problem, fit, (DRY,), narrows=True).converged
     assert sizes == [1.0, 0.25, 1.0, 0.25]
+    # While others are still to be compared, the first that gains nothing is the last.
+    assert not refined(problem, fit, (DRY,)).converged
+    assert sizes == [1.0, 0.25, 1.0, 0.25, 1.0]
 
 
 def test_simplices_of_a_stiff_contact_stop_and_say_so(monkeypatch):
