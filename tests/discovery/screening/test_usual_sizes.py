@@ -1,10 +1,11 @@
 """Effects of a free rig are looked for at the sizes of its trials, of a watch as of a crane."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from pma_gym.data.trial import Trial
-from pma_gym.discovery.fitting.candidate_effect import bounds
 from pma_gym.discovery.fitting.fit_problem import FitProblem
 from pma_gym.discovery.fitting.free_parameters import FreeParameters
 from pma_gym.discovery.preparation.noise import white_noise
@@ -164,11 +165,13 @@ def test_a_joint_that_falls_without_a_drive_may_have_friction():
     assert highest_static([falling]) == pytest.approx(2.0 * least, rel=0.03)
 
 
-def test_a_rig_whose_inertia_is_not_one_part_bounds_no_friction():
-    """A station's rotor and slide move on a cable: the catalogue's bounds are all there are."""
-    station = load_model("station")
-    for each in candidate_effects(station, None, []):
-        np.testing.assert_array_equal(each.bounds, bounds(each.paths))
+def test_friction_of_a_rig_without_one_inertia_has_the_bound_of_the_catalogue(monkeypatch):
+    quantity = Quantity("N", 0.0, 500.0, "a test", 0.0, usual=1.0)
+    alone = replace(joint().rig, inertia=())
+    monkeypatch.setattr(type(joint()), "rig", property(lambda _: alone))
+    unknown = sizes(joint(), [swung(0.5, 0.3)])
+    assert unknown is not None and unknown.strongest == np.inf
+    assert unknown.most_friction(quantity) == 500.0
 
 
 def test_a_fit_keeps_to_static_friction_that_the_trials_overcome():
