@@ -40,6 +40,9 @@ as good as turned."""
 NEGLIGIBLE = 0.05
 """Breakpoints within this share of the proposed step are not waited for."""
 
+SAME = 1e-9
+"""Share of the way to a breakpoint within which a stage is at it: rounding."""
+
 LEAST_AIM_S = 3e-7
 """No step is made shorter than this (s) to end at an event."""
 
@@ -228,7 +231,9 @@ def _unseen(
     for first, there, last in courses:
         # Not what has been aimed at.
         far = abs(last) > NEGLIGIBLE * abs(first)
-        is_unseen = (first * there > 0.0) & (first * last < 0.0) & far
+        # A last stage at the breakpoint itself sees it as little as one before it.
+        before = first * (there + SAME * first) > 0.0
+        is_unseen = before & (first * last < 0.0) & far
         unseen = unseen | is_unseen
         share = where(is_unseen, first / (first - last), share)
     return unseen, share

@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from pma_gym.codegen.generic import where
-from pma_gym.codegen.graph import Value
+from pma_gym.codegen.graph import CHANGING, Value
 from pma_gym.codegen.trace import trace
 from pma_gym.effects import Effect
 from pma_gym.effects.arithmetic import positive
@@ -177,8 +177,12 @@ class PlantEquations(Equations):
         """Add the breakpoints of the effects' laws; all states must have been added."""
         for effect in self.effects.values():
             if effect.breakpoint:
-                value = self.call(effect, effect.breakpoint)
-                self.breakpoints.append(Breakpoint(value, self._slope(value)))
+                signals = self.call(effect, effect.breakpoint)
+                for signal in signals if isinstance(signals, tuple) else (signals,):
+                    value = self.graph.value(signal)
+                    # A rig without such a force has no such breakpoint.
+                    if value.level == CHANGING:
+                        self.breakpoints.append(Breakpoint(value, self._slope(value)))
 
     def add_sensors(self, scales: Mapping[str, float]) -> None:
         """Add the lag of every sensor, with the error scales of their outputs.

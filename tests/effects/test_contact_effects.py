@@ -89,6 +89,43 @@ def test_friction_by_load_takes_a_share_of_the_drives_torque(torque):
     assert slope == pytest.approx(0.7 * torque / INERTIA, rel=1e-3)
 
 
+TURNS = np.array([-10.0, -10.0, 3.0, 3.0, -7.0, 1.0, 1.0, -2.0, -2.0, 10.0])
+
+
+def impulse(force, dt):
+    """Integral of the amount of a force between rows that are joined linearly (N s)."""
+    a, b = force[:-1], force[1:]
+    turning = (a * a + b * b) / (2.0 * np.maximum(np.abs(b - a), 1e-300))
+    return dt * np.where(a * b < 0.0, turning, 0.5 * np.abs(a + b))
+
+
+@pytest.mark.parametrize("rig", ["slide", "joint"])
+@pytest.mark.parametrize("effect", ["gain", "friction"])
+def test_a_drive_that_turns_between_rows_is_integrated_exactly(rig, effect):
+    """A kink behind a step's last stage is seen by no error of it, whatever the tolerance."""
+    time = 2e-3 * np.arange(TURNS.size)
+    if rig == "slide":
+        dry = {"drive_share_percent": 20.0, "carried_share_percent": 0.0, "presliding_um": 1e-3}
+        name, command = "load_dependent_friction", {"load_command": -TURNS}
+        make, begun = slide, {"start.velocity_mm_per_s": 300.0}
+        inertia, speed = 2.0, "velocity"
+    else:
+        dry = {"drive_share_percent": 20.0, "carried_share_percent": 0.0, "presliding_deg": 1e-4}
+        name, command = "joint_load_friction", {"torque_command": TURNS}
+        make, begun = joint, {"joint_start.spin_deg_per_s": 1000.0}
+        inertia, speed = INERTIA, "speed"
+    tables = (
+        {name: dry} if effect == "friction" else {"directional_gain": {"difference_percent": 20.0}}
+    )
+    share = -0.2 if effect == "friction" else 0.1
+    held_at = Plant(make(**tables).replace(begun), 1e-8).simulate(Trial(time, command), noise=False)
+    gained = 0.5 * (TURNS[:-1] + TURNS[1:]) * 2e-3 + share * impulse(TURNS, 2e-3)
+    # The bristles deflect in the first of the intervals.
+    changes = np.diff(held_at.truth[speed])[1:]
+    assert (held_at.truth[speed] > 0.0).all()
+    np.testing.assert_allclose(changes, gained[1:] / inertia, rtol=1e-4)
+
+
 def test_friction_by_load_takes_a_share_of_what_a_joint_carries():
     shares = {"drive_share_percent": 0.0, "carried_share_percent": 30.0, "presliding_deg": 0.01}
     model = joint(joint_load_friction=shares, constant_torque={"torque_n_m": -1.0})

@@ -69,6 +69,21 @@ def load_friction_bend(memory, direction, p):
     )
 
 
+def load_breakpoints(drive_force, carried_force, p):
+    """Signals at whose zeros the level has a kink: the forces on both sides of the gear.
+
+    Args:
+        drive_force: force or torque of the drive (N, N m).
+        carried_force: force or torque that the rig carries (N, N m).
+        p: LoadDependentFriction or JointLoadFriction: drive_share, carried_share.
+    Returns:
+        Both forces; 1 in place of one that has no share.
+    """
+    drives = where(p.drive_share > 0.0, 1.0, 0.0)
+    carries = where(p.carried_share > 0.0, 1.0, 0.0)
+    return drives * drive_force + (1.0 - drives), carries * carried_force + (1.0 - carries)
+
+
 _SIGNATURE = "odd step of force where the motion turns, in proportion to the force of the drive"
 
 LOAD_DEPENDENT_FRICTION = Effect(
@@ -78,6 +93,7 @@ LOAD_DEPENDENT_FRICTION = Effect(
     law=load_friction,
     rate_independent_law=friction_path,
     path_breakpoint=load_friction_bend,
+    breakpoint=load_breakpoints,
     release_path=release_path,
     held=("presliding",),
     scanned=("presliding",),
@@ -90,6 +106,7 @@ JOINT_LOAD_FRICTION = Effect(
     law=load_friction,
     rate_independent_law=friction_path,
     path_breakpoint=load_friction_bend,
+    breakpoint=load_breakpoints,
     release_path=release_path,
     held=("presliding",),
     scanned=("presliding",),

@@ -2,6 +2,7 @@
 
 from typing import Annotated, NamedTuple
 
+from pma_gym.effects.arithmetic import where
 from pma_gym.effects.effect import Effect
 from pma_gym.units import Quantity
 
@@ -30,10 +31,24 @@ def gain_by_direction(drive_force, p):
     return 0.5 * p.difference * abs(drive_force)
 
 
+def gain_breakpoint(drive_force, p):
+    """Signal at whose zero the law has a kink: the force of the drive.
+
+    Args:
+        drive_force: force or torque of the drive with its mean gain (N, N m).
+        p: DirectionalGain: difference.
+    Returns:
+        The force; 1 where the effect is absent.
+    """
+    there = where(abs(p.difference) > 0.0, 1.0, 0.0)
+    return there * drive_force + (1.0 - there)
+
+
 DIRECTIONAL_GAIN = Effect(
     name="directional_gain",
     port="drive_gain",
     parameters=DirectionalGain,
     law=gain_by_direction,
+    breakpoint=gain_breakpoint,
     signature="force that is missing in one direction in proportion to the command, at any speed",
 )
