@@ -88,7 +88,12 @@ class DrivenCampaign:
         start = (float(reference.q[0]), 0.0)
         moved = rig, tuple(effects), transmission, controller, rows, start
         if self.simulator == "MuJoCo":
-            motion = mujoco_axis.simulate(*moved, self._mujoco_step())
+            step = self._mujoco_step()
+            if math.isinf(seconds) and any(
+                each.kinetic(0.0, 0.0, rig.peak_force) for each in effects
+            ):
+                step = mujoco_axis.dry_step(step, rows / rig.rate)
+            motion = mujoco_axis.simulate(*moved, step)
         else:
             motion = stick_slip.simulate(*moved)
         controller.end(float(motion.q[-1]))

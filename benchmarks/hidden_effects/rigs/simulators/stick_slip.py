@@ -153,7 +153,8 @@ class _Contact:
     def _slip(
         self, q: float, v: float, sign: float, time: float, step: float
     ) -> tuple[float, float, float]:
-        """A step while it slips, at most until it stops; what it took (s)."""
+        """A step while it slips, at most until it stops or the drive turns; what it took (s)."""
+        step = self._until_it_turns(time, step)
         end = self._step(q, v, sign, time, step)
         friction = self.axis.static(end[0], self.drive.at(time + step)) > 0.0
         if not friction or end[1] * sign >= 0.0:
@@ -182,6 +183,23 @@ class _Contact:
         a4 = go(q + h * v3, v4, u2, sign)
         q_end = q + h / 6.0 * (v + 2.0 * v2 + 2.0 * v3 + v4)
         return q_end, v + h / 6.0 * (a1 + 2.0 * a2 + 2.0 * a3 + a4)
+
+    def _until_it_turns(self, time: float, step: float) -> float:
+        """A step, or less of it where the drive's force changes its sign within it (s).
+
+        What goes with the amount of that force has a kink there.
+        """
+        low, high = 0.0, step
+        begun = self.drive.at(time)
+        if begun * self.drive.at(time + step) >= 0.0:
+            return step
+        for _ in range(HALVINGS):
+            middle = 0.5 * (low + high)
+            if self.drive.at(time + middle) * begun > 0.0:
+                low = middle
+            else:
+                high = middle
+        return high
 
     def _until_it_breaks(self, q: float, time: float, left: float) -> float:
         """How long it still sticks, at most what is left (s)."""

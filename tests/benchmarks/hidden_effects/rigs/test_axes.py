@@ -117,6 +117,41 @@ def test_a_steady_force_ends_in_the_speed_that_balances_it(simulate, effect, pus
         assert driven.q[-1] == pytest.approx(-0.5 * 7.999**2, rel=1e-3)
 
 
+def rattled(row, q):
+    return float(np.random.default_rng(row).normal(0.0, 4.0))
+
+
+def test_friction_that_bends_where_the_drive_turns_is_exact_at_the_longest_step(monkeypatch):
+    damped = rig(SLIDE, damping=5.0, rate=1000.0)
+    friction = (laws.LoadFriction(0.3),)
+    rough = moved(stick_slip.simulate, damped, friction, rattled, rows=1000)
+    monkeypatch.setattr(stick_slip, "LONGEST", 2e-5)
+    fine = moved(stick_slip.simulate, damped, friction, rattled, rows=1000)
+    assert np.abs(fine.q).max() > 1e-4
+    assert np.abs(rough.q - fine.q).max() < 1e-9
+
+
+def test_mujoco_s_dry_friction_is_nearer_at_a_tenth_of_the_step():
+    pytest.importorskip("mujoco")
+    damped = rig(SLIDE, damping=5.0, rate=1000.0)
+    friction = (laws.LoadFriction(0.3),)
+    exact = moved(stick_slip.simulate, damped, friction, rattled, rows=1000)
+    step = mujoco_axis.dry_step(mujoco_axis.LONGEST, 1.0)
+    assert step == pytest.approx(0.1 * mujoco_axis.LONGEST)
+    errors = [
+        np.abs(
+            mujoco_axis.simulate(
+                damped, friction, Transmission(), rattled, 1000, (0.0, 0.0), each
+            ).q
+            - exact.q
+        ).max()
+        for each in (mujoco_axis.LONGEST, step)
+    ]
+    assert errors[1] < 0.2 * errors[0]
+    # A file of an hour takes the step that other forces ask for.
+    assert mujoco_axis.dry_step(mujoco_axis.LONGEST, 3600.0) == mujoco_axis.LONGEST
+
+
 POSITION_LAWS = (
     laws.Spring(40.0),
     laws.HardeningSpring(3e3),
