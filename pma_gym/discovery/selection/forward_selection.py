@@ -101,7 +101,7 @@ def select(
     chosen, best = exchanged(problem, best, chosen, rounds, candidates, places)
     problem = replace(problem, noise=reestimated_noise(problem, best, chosen))
     fit = refit(problem, best, chosen, journal)
-    chosen, fit = with_scanned(problem, fit, chosen, journal)
+    chosen, fit = with_scanned(problem, fit, chosen, journal, ends_rigid=True)
     if is_rugged(fit, chosen):
         fit = settled(problem, replace(fit, spread=best.spread), chosen)
     fit = replace(fit, covariance=covariance(problem, fit, chosen))

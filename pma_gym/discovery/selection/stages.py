@@ -27,9 +27,10 @@ LEAST_CHANGE = 0.15
 """Least rms of what an effect changes beyond parameters, over the noise of the signal where that is
 most: what is smaller is not worth a name, and no model's arithmetic is that exact."""
 
-PIECES_CHANGE = 0.05
-"""The same of pieces of a trial, each with its own start: that takes up most of what an effect does
-in the whole trial. An assumption: friction or a spring as large as the noise shows so little."""
+TAKEN_UP_CHANGE = 0.05
+"""The same where a nuisance takes up most of what an effect does: a start of each piece of a trial,
+or a drift, which is as slow as creep. An assumption: friction or a spring as large as the noise
+shows so little in pieces, and creep as large as the noise changes 0.07 to 0.13 beside a drift."""
 
 COARSE_CHANGE = 0.5
 """The same beside a sensor whose readings keep to coarse steps: what is lost between them is no
@@ -183,4 +184,5 @@ def passes(problem: FitProblem, each: ScreeningScore, missing: bool = False) -> 
 def _least_change(problem: FitProblem) -> float:
     """Least rms of what an effect changes, over the noise."""
     in_pieces = len(set(problem.files)) < len(problem.trials)
-    return PIECES_CHANGE if in_pieces else LEAST_CHANGE
+    drifts = any(each.drift for each in problem.noise)
+    return TAKEN_UP_CHANGE if in_pieces or drifts else LEAST_CHANGE

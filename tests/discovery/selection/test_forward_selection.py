@@ -215,15 +215,19 @@ def test_noise_larger_in_places_bursts_but_names_nothing(monkeypatch):
 
 
 @pytest.mark.parametrize(("change", "whole", "pieces"), [(0.3, 1, 1), (0.08, 0, 1), (0.03, 0, 0)])
-def test_in_pieces_of_one_file_a_smaller_change_counts(change, whole, pieces):
+def test_a_smaller_change_counts_in_pieces_of_one_file_and_beside_a_drift(change, whole, pieces):
     """Each piece has a start of its own, which takes up most of what an effect does."""
     candidate = candidate_effects(STATION)[0]
     score = ScreeningScore(candidate, 99.0, 0.0005, 0, 1.0, change, None, ())
     trials = commanded(2)
     own = free_parameters(STATION)
     problem = FitProblem(trials, STATION, own, (), files=("one", "other"))
+    problem = replace(problem, noise=(white_noise(1e-5),) * 4)
     assert passes(problem, score) == bool(whole)
     assert passes(replace(problem, files=("one", "one")), score) == bool(pieces)
+    # A drift takes up most of what creep does.
+    drifting = (replace(white_noise(1e-5), drift=1e-5, waves=2), *problem.noise[1:])
+    assert passes(replace(problem, noise=drifting), score) == bool(pieces)
 
 
 def test_an_effect_that_ended_at_nothing_is_not_named():

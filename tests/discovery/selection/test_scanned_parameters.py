@@ -81,6 +81,43 @@ def test_no_contact_is_tried_that_rings_faster_than_any_reading_shows(stiff_cont
     assert values(best.model, [PRESLIDING])[0] >= values(fit.model, [PRESLIDING])[0]
 
 
+def test_a_contact_stays_rigid_where_no_rung_explains_more():
+    """Friction as the usual rung has it is off by the square root of how far that deflects."""
+    tables = {
+        "two_way_drive": {"gain_n_per_v": 20.0, "middle_v": 5.0},
+        "slide": {"mass_kg": 44.0},
+        "symmetric_damping": {"intercept_n_s_per_mm": 0.7, "slope_n_s_per_mm_per_kpa": 0.0},
+        "start": {"contraction_mm": 0.0, "velocity_mm_per_s": 0.0},
+    }
+    model = Model("axis", "", "slide", {n: CATALOGUE[n].parse(t) for n, t in tables.items()})
+    shares = {"drive_share_percent": 8.0, "carried_share_percent": 0.0, "presliding_um": 0.00011}
+    rubbing = model.with_effects({"load_dependent_friction": shares})
+    time, given = np.arange(0.0, 1.0, 0.005), []
+    for seed, hertz in enumerate((2.6, 4.1, 1.7, 3.3)):
+        load = 60.0 * np.sin(2.0 * np.pi * hertz * time) + 5.0 * np.sin(40.0 * time + seed)
+        read = Plant(rubbing).simulate(Trial(time, {"load_command": load}), noise=False)
+        noise = 1e-6 * np.random.default_rng(seed).standard_normal(time.size)
+        at = read.measurements["contraction"] + noise
+        given.append(Trial(time, read.commands, {"contraction": at}))
+    problem = FitProblem(given, model, free_parameters(model), (white_noise(1e-6),) * 2)
+    (dry,) = (
+        each
+        for each in candidate_effects(model, None, given)
+        if each.name == "load_dependent_friction"
+    )
+    path = "load_dependent_friction.presliding_um"
+    rung = problem.fit(model.with_effects({dry.name: {**shares, "presliding_um": 0.02}}), (dry,))
+    assert rung is not None and problem.left(rung) < 1.1
+    journal = Journal(None, [], problem.given, "")
+    (held,), best = with_scanned(problem, rung, (dry,), journal, ends_rigid=True)
+    assert values(best.model, [path])[0] < 0.001
+    assert values(held.beside(problem.given), [path]) == values(best.model, [path])
+    share = "load_dependent_friction.drive_share_percent"
+    value, error = best.estimate(share)
+    assert abs(value - 8.0) < 2.0 * error
+    assert abs(rung.estimate(share)[0] - 8.0) > 3.0 * error
+
+
 def test_what_is_scanned_is_held():
     for effect in CATALOGUE.values():
         assert set(effect.scanned) <= set(effect.held)
