@@ -40,6 +40,7 @@ from pma_gym.discovery.selection.forward_selection import Selection, select
 from pma_gym.discovery.selection.nested_laws import nested
 from pma_gym.discovery.selection.rivals import rivals
 from pma_gym.discovery.verdict.adequacy import Residual, adequacy
+from pma_gym.discovery.verdict.common_drift import with_common_drift
 from pma_gym.discovery.verdict.decision import suspicious
 from pma_gym.discovery.verdict.findings import Findings
 from pma_gym.discovery.verdict.tolerated import is_tolerated, may_be_tolerated, without_effects
@@ -318,6 +319,8 @@ class _Work:
         folds = fold_of_rows(problem.trials, problem.files)
         answered = findings.given.rig.is_free
         judged = adequacy(logged, unseen_, fitted, floors, folds, self.seed, answered)
+        if not findings.selection.chosen and not problem.in_pieces:
+            judged = with_common_drift(judged, logged, fitted.left, problem.noise)
         return replace(findings, adequacy=judged)
 
     def _adequate(self, findings: Findings, logged: Sequence[Logged]) -> Findings:

@@ -184,6 +184,11 @@ class FitProblem:
         return [numbers.setdefault(file, len(numbers)) for file in self.files]
 
     @property
+    def in_pieces(self) -> bool:
+        """Whether files are taken in pieces, each a trial."""
+        return bool(self.files) and len(set(self.files)) < len(self.trials)
+
+    @property
     def journal_key(self) -> str:
         """What tells its fits from those of the same diagnosis with other noise or other pieces."""
         return f"{self.noise}{f' pieces of {self.wholes}' if self.wholes else ''}"

@@ -68,6 +68,13 @@ def undecided(diagnosis: Diagnosis) -> str:
             "there is one short trial, of which no reading can be left out of the fit; log a "
             "second trial with other commands"
         )
+    if judged.fault == "alike":
+        return (
+            f"what drifts in {name} is alike in all trials, and a sensor drifts otherwise in each: "
+            "something slow, such as a leak, may be missing; log a trial that holds its commands "
+            "for as long, and one of these again after a wait: a leak or creep begins with each "
+            "trial, the drift of a sensor does not"
+        )
     if judged.fault == "wide":
         return (
             f"a missing law of state or command may still cause up to "

@@ -57,6 +57,7 @@ FAULTS = {
     "explained": "regression explains too much",
     "not predicted": "misfit too large on readings left out",
     "follows": "regression explains too much of readings left out",
+    "alike": "drift alike in all trials",
     "wide": "bound too wide",
     "no floor": "no floor",
     "not left out": "no readings left out",

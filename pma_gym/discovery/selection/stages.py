@@ -183,6 +183,5 @@ def passes(problem: FitProblem, each: ScreeningScore, missing: bool = False) -> 
 
 def _least_change(problem: FitProblem) -> float:
     """Least rms of what an effect changes, over the noise."""
-    in_pieces = len(set(problem.files)) < len(problem.trials)
     drifts = any(each.drift for each in problem.noise)
-    return TAKEN_UP_CHANGE if in_pieces or drifts else LEAST_CHANGE
+    return TAKEN_UP_CHANGE if problem.in_pieces or drifts else LEAST_CHANGE

@@ -40,15 +40,16 @@ BLOCK_S, LEAST_BLOCKS = 1.0, 8
 """Length of the bootstrap's blocks (s), and fewest blocks whose bound means anything."""
 
 Fault = Literal[
-    "misfit", "explained", "not predicted", "follows", "wide", "no floor", "not left out"
+    "misfit", "explained", "not predicted", "follows", "alike", "wide", "no floor", "not left out"
 ]
 """What is wrong with a signal. Structure is missing: too large a misfit of readings that the model
 was fitted to (`misfit`), or a regression that explains too much of them (`explained`). The
-verdict is `undecidable`: the same of readings left out alone (`not predicted`, `follows`), too wide
-a bound (`wide`), no floor, no readings that could be left out."""
+verdict is `undecidable`: the same of readings left out alone (`not predicted`, `follows`), a drift
+that is alike in all trials (`alike`, `common_drift`), too wide a bound (`wide`), no floor, no
+readings that could be left out."""
 
 STRUCTURE: tuple[Fault, ...] = ("misfit", "explained")
-OPEN: tuple[Fault, ...] = ("not predicted", "follows", "wide", "no floor", "not left out")
+OPEN: tuple[Fault, ...] = ("not predicted", "follows", "alike", "wide", "no floor", "not left out")
 
 
 @dataclass(frozen=True)
