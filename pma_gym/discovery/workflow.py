@@ -319,8 +319,9 @@ class _Work:
         folds = fold_of_rows(problem.trials, problem.files)
         answered = findings.given.rig.is_free
         judged = adequacy(logged, unseen_, fitted, floors, folds, self.seed, answered)
-        if not findings.selection.chosen and not problem.in_pieces:
-            judged = with_common_drift(judged, logged, fitted.left, problem.noise)
+        if not problem.in_pieces:
+            beside = bool(findings.selection.chosen)
+            judged = with_common_drift(judged, logged, fitted.left, problem.noise, beside)
         return replace(findings, adequacy=judged)
 
     def _adequate(self, findings: Findings, logged: Sequence[Logged]) -> Findings:

@@ -34,6 +34,7 @@ def unknown_sentence(diagnosis: Diagnosis, reason: Reason, trials: str) -> str:
         "scatters": _scatters,
         "outdone": _outdone,
         "undetermined": _undetermined,
+        "alike": _alike,
     }[reason.why]
     return (
         f"Something is missing in model {diagnosis.given.name} that {_not_carried(diagnosis)}: "
@@ -146,6 +147,13 @@ def _undetermined(reason: Reason, _: str) -> str:
     return (
         "but beside each other they are not determined: "
         f"{'either' if len(reason.effects) == 2 else 'each'} may be absent"
+    )
+
+
+def _alike(reason: Reason, _: str) -> str:
+    return (
+        f"but what drifts in {signal_name(reason.of)} is alike in all trials, and a sensor drifts "
+        "otherwise in each"
     )
 
 

@@ -11,6 +11,7 @@ from pma_gym.discovery.screening.autocorrelation import SURE
 from pma_gym.discovery.screening.residuals import FAR, autocorrelation_tests, left_in_noises
 from pma_gym.discovery.verdict.adequacy import MOST_EXPLAINED, MOST_FLOORS
 from pma_gym.discovery.verdict.approximate import MOST_LEFT as MOST_APPROXIMATE
+from pma_gym.discovery.verdict.common_drift import SURELY
 from pma_gym.discovery.verdict.findings import Findings
 from pma_gym.discovery.verdict.homogeneity_test import homogeneity_test
 from pma_gym.discovery.verdict.residual_fraction import ResidualFraction
@@ -64,13 +65,14 @@ Why = Literal[
     "scatters",
     "outdone",
     "undetermined",
+    "alike",
 ]
 """`unexplained`: the residual is no noise, and no effect was added. `misfit`: nor is it, it exceeds
 the signal's floor (`adequacy`). `explained`: nor is it, a flexible regression explains it. `slow`:
 too much of what was slow in it is left. `autocorrelated`: too much of its autocorrelated part is
 left. `scatters`: an effect has another size by trial or condition. `outdone`: a freely drawn law
 explains more. `undetermined`: each of several laws of the position may be absent beside the
-others."""
+others. `alike`: what drifts is alike in all trials (`common_drift`)."""
 
 
 @dataclass(frozen=True)
@@ -142,6 +144,9 @@ def leaves_structure(findings: Findings, left: ResidualFraction) -> Reason | Non
     problem, chosen = findings.problem, findings.selection.chosen
     if not chosen:
         return None
+    alike = _alike(findings)
+    if alike is not None:
+        return replace(alike, effects=tuple(each.name for each in chosen), leaves=left.slow)
     before = problem.sum_of_squares(findings.refitted.model) - problem.count
     after = problem.sum_of_squares(findings.selection.fit.model, chosen) - problem.count
     drawn = _undetermined(findings) or _drawn_by_shapes(findings, after > MOST_OF_RIVALS * before)
@@ -152,6 +157,14 @@ def leaves_structure(findings: Findings, left: ResidualFraction) -> Reason | Non
     reason = _inadequate(findings) or _far_off(findings)
     names = tuple(candidate.name for candidate in chosen)
     return None if reason is None else replace(reason, effects=names, leaves=left.slow)
+
+
+def _alike(findings: Findings) -> Reason | None:
+    """Something slow that begins with every trial is left, which is no drift of a sensor."""
+    for name, judged in findings.adequacy.signals.items():
+        if judged.fault == "alike":
+            return Reason("alike", np.nan, SURELY, of=BY_QUANTITY[name].name, final=True)
+    return None
 
 
 def _undetermined(findings: Findings) -> Reason | None:

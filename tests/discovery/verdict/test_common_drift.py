@@ -9,7 +9,12 @@ from pma_gym.discovery.preparation.acceptance_floors import REPEATS, TOLERANCE, 
 from pma_gym.discovery.preparation.noise import white_noise
 from pma_gym.discovery.preparation.nuisance_projection import drift_columns
 from pma_gym.discovery.verdict.adequacy import Adequacy, SignalAdequacy
-from pma_gym.discovery.verdict.common_drift import chance_of_common_drift, with_common_drift
+from pma_gym.discovery.verdict.common_drift import (
+    CHANCE,
+    SURELY,
+    chance_of_common_drift,
+    with_common_drift,
+)
 from pma_gym.estimation.logged import Logged
 from tests.discovery.laboratory import STATION, measured
 
@@ -86,6 +91,13 @@ def test_an_adequate_signal_is_left_open_unless_the_lab_is_content(logged, sourc
     after = with_common_drift(judged, logged, rows, noises)
     assert after.signals[name].fault == fault
     assert (after.undecided is None) == (fault is None) and after.structure is None
+    # Beside effects it takes more to withhold a name; then it comes before whatever else is wrong.
+    faint = left(logged, np.random.default_rng(9), common=0.8)
+    assert SURELY < chance_of_common_drift(logged, faint, noise(), PRESSURE) < CHANCE
+    assert with_common_drift(judged, logged, faint, noises).signals[name].fault == fault
+    assert with_common_drift(judged, logged, faint, noises, beside=True) == judged
     # What is wrong already stays so.
     wrong = Adequacy({name: replace(judged.signals[name], fault="misfit")})
     assert with_common_drift(wrong, logged, rows, noises) == wrong
+    after = with_common_drift(wrong, logged, rows, noises, beside=True)
+    assert after.signals[name].fault == (fault or "misfit")
