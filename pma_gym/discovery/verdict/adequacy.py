@@ -107,6 +107,11 @@ class Adequacy:
         """The signal that leaves most open, and its name."""
         return self._worst(OPEN)
 
+    @property
+    def alike(self) -> str | None:
+        """A signal whose drift is alike in all trials; None without one."""
+        return next((name for name, each in self.signals.items() if each.fault == "alike"), None)
+
     def _worst(self, faults: Sequence[Fault]) -> tuple[str, SignalAdequacy] | None:
         """The signal with one of some faults whose misfit is largest, and its name."""
         faulty = [(name, each) for name, each in self.signals.items() if each.fault in faults]

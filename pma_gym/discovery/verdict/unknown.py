@@ -161,10 +161,10 @@ def leaves_structure(findings: Findings, left: ResidualFraction) -> Reason | Non
 
 def _alike(findings: Findings) -> Reason | None:
     """Something slow that begins with every trial is left, which is no drift of a sensor."""
-    for name, judged in findings.adequacy.signals.items():
-        if judged.fault == "alike":
-            return Reason("alike", np.nan, SURELY, of=BY_QUANTITY[name].name, final=True)
-    return None
+    name = findings.adequacy.alike
+    if name is None:
+        return None
+    return Reason("alike", np.nan, SURELY, of=BY_QUANTITY[name].name, final=True)
 
 
 def _undetermined(findings: Findings) -> Reason | None:

@@ -15,7 +15,7 @@ from pma_gym.discovery.report.verdict_text import sentence
 from pma_gym.discovery.result.estimates import Approximate, Estimate, NamedEffect
 from pma_gym.discovery.result.misfit import Gap
 from pma_gym.discovery.verdict import approximate, unknown
-from pma_gym.discovery.verdict.adequacy import SignalAdequacy
+from pma_gym.discovery.verdict.adequacy import Adequacy, SignalAdequacy
 from pma_gym.discovery.verdict.approximate import LEAST_MISFIT, MOST_LEFT, closing
 from pma_gym.discovery.verdict.residual_fraction import ResidualFraction
 from pma_gym.discovery.verdict.unknown import Reason, leaves_structure
@@ -101,7 +101,7 @@ def test_effects_that_leave_much_structure_are_not_it(after, structure, figure, 
         problem=problem,
         refitted=SimpleNamespace(model=before),
         selection=selection,
-        adequacy=SimpleNamespace(structure=structure and ("load", structure)),
+        adequacy=SimpleNamespace(structure=structure and ("load", structure), alike=None),
     )
     monkeypatch.setattr(unknown, "left_in_noises", lambda *_: {"load": after, "rotation": 0.0})
     reason = leaves_structure(findings, ResidualFraction(0.2, 0.05))
@@ -109,6 +109,23 @@ def test_effects_that_leave_much_structure_are_not_it(after, structure, figure, 
     if reason is not None:
         said = (reason.why, reason.of, reason.effects, reason.leaves)
         assert said == ("misfit", "load_n", ("hysteresis",), 0.2)
+
+
+def test_a_drift_alike_in_all_trials_withholds_the_name_of_what_explains_all():
+    problem = SimpleNamespace(count=100, sum_of_squares=lambda model, *_: 100 * model**2)
+    selection = SimpleNamespace(
+        chosen=[SimpleNamespace(name="creep", effect="creep")], fit=SimpleNamespace(model=1.0)
+    )
+    judged = Adequacy({"pressure": SignalAdequacy(None, 1.0, 0.0, 0.0, 1.0, "alike")})
+    findings = SimpleNamespace(
+        problem=problem,
+        refitted=SimpleNamespace(model=50.0),
+        selection=selection,
+        adequacy=judged,
+    )
+    reason = leaves_structure(findings, ResidualFraction(0.2, 0.05))
+    assert reason is not None and reason.final
+    assert (reason.why, reason.of, reason.effects) == ("alike", "pressure_kpa", ("creep",))
 
 
 @pytest.mark.parametrize(
@@ -142,7 +159,7 @@ def test_two_laws_of_the_position_leave_noise_or_are_unknown(
         refitted=SimpleNamespace(model=before),
         selection=SimpleNamespace(chosen=chosen, fit=fit_with(after, 5.0)),
         rivals=(equal, *[()] * (len(chosen) - 1)),
-        adequacy=SimpleNamespace(structure=None),
+        adequacy=SimpleNamespace(structure=None, alike=None),
     )
     monkeypatch.setattr(unknown, "left_in_noises", lambda *_: {"contraction": after})
     reason = leaves_structure(findings, ResidualFraction(0.0, 0.0))
@@ -169,7 +186,7 @@ def test_two_laws_of_the_position_that_may_be_absent_are_unknown(
         refitted=SimpleNamespace(model=50.0),
         selection=SimpleNamespace(chosen=chosen, fit=fit_with(1.0, errors)),
         rivals=((),) * len(chosen),
-        adequacy=SimpleNamespace(structure=None),
+        adequacy=SimpleNamespace(structure=None, alike=None),
     )
     monkeypatch.setattr(unknown, "left_in_noises", lambda *_: {"contraction": 1.0})
     reason = leaves_structure(findings, ResidualFraction(0.0, 0.0))
