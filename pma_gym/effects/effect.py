@@ -54,8 +54,8 @@ class Effect:
             None for an effect that backlash does not affect.
         event: event function: a signal at whose zero the law has a kink; steps end there.
         breakpoint: a signal, or a row of them, at whose zero the law changes form; steps end close
-            to it. A kink that no step ends close to may lie behind the last point at which a step
-            asks for its rates, and is seen by none.
+            to it. A slope that jumps elsewhere may do so behind the last point at which a step asks
+            for its rates, and shows in none of them.
         signature: feature of measured data that distinguishes the effect.
         memories: number of states. With more than one, laws get `memory` as a tuple, and the rate
             law returns a (source, decay) for each.

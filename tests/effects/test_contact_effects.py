@@ -102,7 +102,7 @@ def impulse(force, dt):
 @pytest.mark.parametrize("rig", ["slide", "joint"])
 @pytest.mark.parametrize("effect", ["gain", "friction"])
 def test_a_drive_that_turns_between_rows_is_integrated_exactly(rig, effect):
-    """A kink behind a step's last stage is seen by no error of it, whatever the tolerance."""
+    """A slope that jumps behind a step's last stage shows in no error of it, at any tolerance."""
     time = 2e-3 * np.arange(TURNS.size)
     if rig == "slide":
         dry = {"drive_share_percent": 20.0, "carried_share_percent": 0.0, "presliding_um": 1e-3}

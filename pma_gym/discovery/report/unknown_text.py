@@ -152,8 +152,8 @@ def _undetermined(reason: Reason, _: str) -> str:
 
 def _alike(reason: Reason, _: str) -> str:
     return (
-        f"but what drifts in {signal_name(reason.of)} is alike in all trials, and a sensor drifts "
-        "otherwise in each"
+        f"but what drifts in {signal_name(reason.of)} is alike in all trials (chance "
+        f"{reason.figure:.0e}), and a sensor drifts otherwise in each"
     )
 
 

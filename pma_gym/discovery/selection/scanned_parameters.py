@@ -7,8 +7,8 @@ and on in the direction in which the trials ask for it.
 
 A shorter distance before it slips is the simpler law. What friction does at a reversal changes with
 the square root of the distance, so that a rung where chi-square is as good as flat still moves the
-other parameters by their errors: a share of friction was 9 % off. So the rigid end of the ladder is
-tried at last, and stays unless the rung explains more than chance.
+other parameters by their errors: a share of friction was 6.0 % at 0.02 um, 6.2 % at 0.0001. So the
+rigid end of the ladder is tried at last, and stays unless the rung explains more than chance.
 """
 
 from collections.abc import Mapping, Sequence

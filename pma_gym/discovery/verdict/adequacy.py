@@ -77,6 +77,7 @@ class SignalAdequacy:
         bound: upper 95 % bound of that.
         fitted: misfit of the readings that the model was fitted to, in floors.
         fault: what is wrong; None where the signal is adequate.
+        common: chance that a sensor drifts as much alike in all trials; NaN where it is no fault.
     """
 
     floor: AcceptanceFloor | None
@@ -85,6 +86,7 @@ class SignalAdequacy:
     bound: float = np.nan
     fitted: float = np.nan
     fault: Fault | None = None
+    common: float = np.nan
 
 
 @dataclass(frozen=True)
@@ -108,9 +110,10 @@ class Adequacy:
         return self._worst(OPEN)
 
     @property
-    def alike(self) -> str | None:
-        """A signal whose drift is alike in all trials; None without one."""
-        return next((name for name, each in self.signals.items() if each.fault == "alike"), None)
+    def alike(self) -> tuple[str, SignalAdequacy] | None:
+        """The signal whose drift is most surely alike in all trials, and its name."""
+        alike = [item for item in self.signals.items() if item[1].fault == "alike"]
+        return min(alike, key=lambda item: item[1].common, default=None)
 
     def _worst(self, faults: Sequence[Fault]) -> tuple[str, SignalAdequacy] | None:
         """The signal with one of some faults whose misfit is largest, and its name."""

@@ -65,8 +65,9 @@ def with_common_drift(
             continue
         if known.floor.source == TOLERANCE:
             continue
-        if chance_of_common_drift(logged, left, noise, channel) < most:
-            signals[signal.name] = replace(known, fault="alike")
+        chance = chance_of_common_drift(logged, left, noise, channel)
+        if chance < most:
+            signals[signal.name] = replace(known, fault="alike", common=chance)
     return Adequacy(signals)
 
 

@@ -83,7 +83,8 @@ class Reason:
         why: see `Why`.
         figure: what was found: standard errors (`unexplained`), floors (`misfit`, `explained`), a
             share (`slow`, `autocorrelated`, `scatters`), the fall of chi-square by the law
-            (`outdone`), or the size of an effect in its standard errors (`undetermined`).
+            (`outdone`), the size of an effect in its standard errors (`undetermined`), or a chance
+            (`alike`).
         limit: the most that it may be, in the same unit.
         effects: what was added; empty if nothing was.
         nearest: the likeliest effect, where nothing was added; empty if none was looked at.
@@ -161,10 +162,11 @@ def leaves_structure(findings: Findings, left: ResidualFraction) -> Reason | Non
 
 def _alike(findings: Findings) -> Reason | None:
     """Something slow that begins with every trial is left, which is no drift of a sensor."""
-    name = findings.adequacy.alike
-    if name is None:
+    alike = findings.adequacy.alike
+    if alike is None:
         return None
-    return Reason("alike", np.nan, SURELY, of=BY_QUANTITY[name].name, final=True)
+    name, judged = alike
+    return Reason("alike", judged.common, SURELY, of=BY_QUANTITY[name].name, final=True)
 
 
 def _undetermined(findings: Findings) -> Reason | None:

@@ -70,7 +70,7 @@ def load_friction_bend(memory, direction, p):
 
 
 def load_breakpoints(drive_force, carried_force, p):
-    """Signals at whose zeros the level has a kink: the forces on both sides of the gear.
+    """Signals at whose zeros the slope of the level jumps: the forces on both sides of the gear.
 
     Args:
         drive_force: force or torque of the drive (N, N m).

@@ -32,7 +32,7 @@ def gain_by_direction(drive_force, p):
 
 
 def gain_breakpoint(drive_force, p):
-    """Signal at whose zero the law has a kink: the force of the drive.
+    """Signal at whose zero the slope of the law jumps: the force of the drive.
 
     Args:
         drive_force: force or torque of the drive with its mean gain (N, N m).

@@ -116,7 +116,7 @@ def test_a_drift_alike_in_all_trials_withholds_the_name_of_what_explains_all():
     selection = SimpleNamespace(
         chosen=[SimpleNamespace(name="creep", effect="creep")], fit=SimpleNamespace(model=1.0)
     )
-    judged = Adequacy({"pressure": SignalAdequacy(None, 1.0, 0.0, 0.0, 1.0, "alike")})
+    judged = Adequacy({"pressure": SignalAdequacy(None, 1.0, 0.0, 0.0, 1.0, "alike", 1e-9)})
     findings = SimpleNamespace(
         problem=problem,
         refitted=SimpleNamespace(model=50.0),
@@ -124,7 +124,7 @@ def test_a_drift_alike_in_all_trials_withholds_the_name_of_what_explains_all():
         adequacy=judged,
     )
     reason = leaves_structure(findings, ResidualFraction(0.2, 0.05))
-    assert reason is not None and reason.final
+    assert reason is not None and reason.final and reason.figure == 1e-9
     assert (reason.why, reason.of, reason.effects) == ("alike", "pressure_kpa", ("creep",))
 
 

@@ -101,3 +101,7 @@ def test_an_adequate_signal_is_left_open_unless_the_lab_is_content(logged, sourc
     assert with_common_drift(wrong, logged, rows, noises) == wrong
     after = with_common_drift(wrong, logged, rows, noises, beside=True)
     assert after.signals[name].fault == (fault or "misfit")
+    chance = chance_of_common_drift(logged, rows, noise(), PRESSURE)
+    assert after.alike == (
+        fault and (name, replace(wrong.signals[name], fault=fault, common=chance))
+    )

@@ -22,7 +22,7 @@ LONGEST, SHORTEST = 0.25e-3, 0.01e-3
 
 DRY_SHARE, MOST_DRY_STEPS = 0.1, 2e6
 """Share of the longest step that is taken with dry friction, and how many of them a file may have:
-one of five minutes takes a minute then."""
+so many took 12 s on one core."""
 
 RADIUS = 0.1
 """Of gyration of a slide's body (m); only its drag depends on it."""
@@ -108,9 +108,9 @@ def step_within(error: float, acceleration: float) -> float:
 def dry_step(step: float, duration: float) -> float:
     """Step where dry friction is hidden (s): a tenth, or what `MOST_DRY_STEPS` leave of that.
 
-    Friction turns within a step, and its level has a kink where the drive's force changes its sign.
-    That errs by order 1: of a slide of 44 kg by 1.2 um in 8 s at the longest step, by 0.1 um at a
-    tenth of it.
+    Friction turns within a step, and the slope of its level jumps where the drive's force changes
+    sign. That errs by order 1: of a slide of 44 kg by 1.2 um in 8 s at the longest step, by 0.1 um
+    at a tenth of it.
 
     Args:
         step: that other forces ask for (s).

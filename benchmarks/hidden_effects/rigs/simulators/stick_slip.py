@@ -187,7 +187,7 @@ class _Contact:
     def _until_it_turns(self, time: float, step: float) -> float:
         """A step, or less of it where the drive's force changes its sign within it (s).
 
-        What goes with the amount of that force has a kink there.
+        The slope of what goes with the amount of that force jumps there.
         """
         low, high = 0.0, step
         begun = self.drive.at(time)
