@@ -70,7 +70,7 @@ def undecided(diagnosis: Diagnosis) -> str:
         )
     if judged.fault == "alike":
         return (
-            f"what drifts in {name} is alike in all trials, and a sensor drifts otherwise in each: "
+            f"{name} drifts alike in all trials, and a sensor drifts otherwise in each: "
             "something slow, such as a leak, may be missing; log a trial that holds its commands "
             "for as long, and one of these again after a wait: a leak or creep begins with each "
             "trial, the drift of a sensor does not"

@@ -68,6 +68,9 @@ def _candidate(diagnosis: Diagnosis) -> str:
 def _best(reason: Reason, residual: str) -> str:
     """The best effects and what they leave."""
     leaves = percent(min(reason.leaves, 1.0))
+    if reason.why == "alike":
+        verb = "does" if len(reason.effects) == 1 else "do"
+        return f"the best, {effect_names(reason.effects)}, {verb} not carry it"
     if reason.effects:
         verb = "leaves" if len(reason.effects) == 1 else "leave"
         share = _past(leaves, percent(reason.limit)) if reason.why == "slow" else leaves
@@ -152,8 +155,8 @@ def _undetermined(reason: Reason, _: str) -> str:
 
 def _alike(reason: Reason, _: str) -> str:
     return (
-        f"but what drifts in {signal_name(reason.of)} is alike in all trials (chance "
-        f"{reason.figure:.0e}), and a sensor drifts otherwise in each"
+        f"since {signal_name(reason.of)} drifts alike in all trials (chance {reason.figure:.0e}), and "
+        "a sensor drifts otherwise in each"
     )
 
 
