@@ -155,8 +155,8 @@ def _undetermined(reason: Reason, _: str) -> str:
 
 def _alike(reason: Reason, _: str) -> str:
     return (
-        f"since {signal_name(reason.of)} drifts alike in all trials (chance {reason.figure:.0e}), and "
-        "a sensor drifts otherwise in each"
+        f"since {signal_name(reason.of)} drifts alike in all trials (chance {reason.figure:.0e}), "
+        "and a sensor drifts otherwise in each"
     )
 
 
