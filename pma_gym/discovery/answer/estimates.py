@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from pma_gym.discovery.fitting.fit_problem import Fitted
+from pma_gym.discovery.fitting.fit_problem import SURE, Fitted
 from pma_gym.discovery.fitting.free_parameters import at_limit, unit
 from pma_gym.discovery.result.estimates import Estimate, NamedEffect
 from pma_gym.discovery.screening.score_test import ScreeningScore
@@ -58,8 +58,8 @@ def estimate(findings: Findings, fit: Fitted, path: str) -> Estimate:
     low, high = min(low, value + min(shifts)), max(high, value + max(shifts))
     low, high = max(low, lower), min(high, upper)
     # A range may be a million times as wide as what a light axis has: what is surely off an end of
-    # it is not at that end.
-    limit = "" if lower < low and high < upper else limit
+    # it is not at that end, whatever another law makes of it.
+    limit = "" if lower < value - SURE * error and value + SURE * error < upper else limit
     return Estimate(value, low, high, unit(path), limit)
 
 

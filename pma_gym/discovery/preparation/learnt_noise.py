@@ -66,7 +66,9 @@ def learnt_noise(
     ]
     learnt = []
     pieces = {i for i, each in enumerate(named) if each.file is not None}
-    drifts = [_drift(logged, pairs, channel, pieces) for channel in range(len(noise))]
+    drifts = [
+        _drift(logged, pairs, channel, pieces, each.level) for channel, each in enumerate(noise)
+    ]
     surely = any(each.chance < CHANCE / len(noise) for each in drifts)
     shares = [each.share for each in drifts if np.isfinite(each.share)]
     usual = float(np.sqrt(np.mean(np.square(shares)))) if shares else 0.0
@@ -127,7 +129,11 @@ class _Drift:
 
 
 def _drift(
-    logged: Sequence[Logged], pairs: Sequence[tuple[int, int]], channel: int, pieces: Container[int]
+    logged: Sequence[Logged],
+    pairs: Sequence[tuple[int, int]],
+    channel: int,
+    pieces: Container[int],
+    noise_level: float,
 ) -> _Drift:
     """Drift of a signal: how much repeats differ by slow cosines, beyond what noise does.
 
@@ -136,6 +142,7 @@ def _drift(
         pairs: which of them repeat each other.
         channel: the signal.
         pieces: which are pieces of runs.
+        noise_level: standard deviation of its noise (SI).
     """
     squares, total, least = [], 0.0, MOST_WAVES
     means, rows = [], 0
@@ -165,9 +172,11 @@ def _drift(
     most = max(least, waves)
     slow = float(powers[:most].sum())
     count = most * len(squares)
-    share = np.sqrt(max(slow - count, 0.0) / total)
+    # Coloured noise has more at these frequencies than its standard deviation says.
+    per_noise = math.sqrt(level) / noise_level
+    share = per_noise * math.sqrt(max(slow - count, 0.0) / total)
     constant = sum(means) / level
-    offset = math.sqrt(max(constant - len(means), 0.0) / max(rows, 1))
+    offset = per_noise * math.sqrt(max(constant - len(means), 0.0) / max(rows, 1))
     by_chance = float(chi2.sf(constant, len(means))) if means else 1.0
     return _Drift(float(share), float(chi2.sf(slow, count)), waves, offset, by_chance)
 

@@ -9,9 +9,10 @@ term (`Effect.terms`); the whole law stays where it explains more than its furth
 of readings left out too, and where the parameter that may be equal is surely above the other and
 not at an end of its range: a static friction of 0 N, or below the dynamic one, borrows the law's
 form for something else. So does one whose Stribeck speed may be the least that there is. Where a
-whole law explains more and its numbers are not surely apart, the interval of the one number holds
-what the whole law says of it. Where the one number leaves more than three noises and the whole law
-does not, or twice the residual, the whole law stays.
+whole law explains more than its further parameters cost and is not taken all the same, the
+intervals of what both laws have hold what the whole law says of it: friction without its rise near
+rest is larger, and damping beside it smaller. Where the one number leaves more than three noises
+and the whole law does not, or twice the residual, the whole law stays.
 """
 
 from collections.abc import Iterator
@@ -146,7 +147,10 @@ def _tied(problem: FitProblem, state: Nested, place: int) -> Nested:
             continue
         fit = simpler.fit
         for whole in _whole_laws(problem, state, simpler, place, tie):
-            if not _explains_more(problem, whole, simpler, tie):
+            if not _explains_more(whole, simpler, tie):
+                continue
+            if _ended(problem, whole, tie.path) or not _asked_for(problem, whole, simpler):
+                fit = _as_wide(fit, whole.fit)
                 continue
             # A simpler law that is far from the trials gives the other parameters false values.
             nearer = whole.fit.chi_square * FAR_NEARER < simpler.fit.chi_square
@@ -154,8 +158,7 @@ def _tied(problem: FitProblem, state: Nested, place: int) -> Nested:
             if nearer or _is_shown(problem, whole, tie):
                 state = whole
                 break
-            if tie.twin:
-                fit = _as_wide(fit, whole.fit, tie.twin)
+            fit = _as_wide(fit, whole.fit)
         else:
             left = (tie.path, *tie.idle)
             known = {each: Undetermined(None, None, unit(each)) for each in left}
@@ -175,18 +178,20 @@ def _is_shown(problem: FitProblem, whole: Nested, tie: Tie) -> bool:
     return apart and all(low > least for low, least in lows)
 
 
-def _as_wide(simpler: Fitted, whole: Fitted, path: str) -> Fitted:
-    """The simpler law's fit, with what the whole law says of a parameter in its spread.
+def _as_wide(simpler: Fitted, whole: Fitted) -> Fitted:
+    """The simpler law's fit, with what the whole law says of its parameters in their spread.
 
-    Where the whole law explains more, but not which of its numbers is the greater, the one number
-    may be any of them.
+    Where the whole law explains more, but not surely which of its numbers does, each of them may
+    be what it is there.
     """
-    value = simpler.estimate(path)[0]
-    low, high = whole.interval(path)
-    if not np.isfinite(high - low):
-        return simpler
-    least, most = simpler.spread.get(path, (value, value))
-    return replace(simpler, spread={**simpler.spread, path: (min(low, least), max(high, most))})
+    spread = dict(simpler.spread)
+    for path in simpler.paths:
+        low, high = whole.interval(path)
+        if np.isfinite(high - low):
+            value = simpler.estimate(path)[0]
+            least, most = spread.get(path, (value, value))
+            spread[path] = min(low, least), max(high, most)
+    return replace(simpler, spread=spread)
 
 
 def _whole_laws(
@@ -199,17 +204,9 @@ def _whole_laws(
         yield replace(state, fit=fit)
 
 
-def _explains_more(problem: FitProblem, whole: Nested, simpler: Nested, tie: Tie) -> bool:
-    """Whether the whole law of an effect explains more than its further parameters cost.
-
-    What it explains more must be worth them as anywhere, with readings left out too.
-    """
-    return (
-        cost(whole.fit) <= cost(simpler.fit)
-        and not below_twin(whole.fit, tie)
-        and not _ended(problem, whole, tie.path)
-        and _asked_for(problem, whole, simpler)
-    )
+def _explains_more(whole: Nested, simpler: Nested, tie: Tie) -> bool:
+    """Whether the whole law of an effect explains more than its further parameters cost."""
+    return cost(whole.fit) <= cost(simpler.fit) and not below_twin(whole.fit, tie)
 
 
 def _ended(problem: FitProblem, state: Nested, path: str) -> bool:

@@ -65,6 +65,19 @@ def test_a_drift_is_learnt_from_repeats_and_one_that_repeats_is_structure() -> N
     assert learnt_noise(_levels(), logged, named)[CHANNEL].drift == 0.0
 
 
+@pytest.mark.parametrize("memory", [0.0, 0.8, 0.95])
+def test_the_size_of_a_drift_does_not_depend_on_the_colour_of_the_noise(memory: float) -> None:
+    """Coloured noise has many times as much at a drift's frequencies as white noise of its size."""
+    rng, at = np.random.default_rng(11), np.arange(4096) / 4096
+    signs = (1.0, -1.0) * 4
+    noises = [_coloured(rng, memory, 4096) + sign * np.cos(np.pi * at) for sign in signs]
+    logged, named = _logged(noises)
+    learnt = learnt_noise(_levels(), logged, named)[CHANNEL]
+    # Two that drift against each other differ by twice what each of them does: by root 2 more than
+    # two that drift at random.
+    assert learnt.drift / UNSURE == pytest.approx(LEVEL, rel=0.15)
+
+
 def test_repeats_with_holes_tell_the_noise_too() -> None:
     """Readings that were set aside, as outliers are, hide neither colour nor drift of the rest."""
     rng = np.random.default_rng(4)

@@ -22,6 +22,8 @@ from pma_gym.plant.model import load_model
 from pma_gym.plant.plant import Plant
 from tests.discovery.laboratory import only
 from tests.discovery.rig_trials import FROZEN
+from tests.discovery.test_imposed_motion import SENSOR, trials
+from tests.plant.test_imposed import imposed
 
 SLIDE = load_model(FROZEN / "driven_slide" / "model.toml")
 STATIC, DYNAMIC, SPEED = (
@@ -189,3 +191,33 @@ def test_the_whole_law_stays_where_most_readings_left_out_ask_for_it(monkeypatch
 
     monkeypatch.setattr(nested_laws, "held_out_misfit", left_out)
     assert len(nested(bench, fit, (DRY,)).chosen[0].fitted_paths) == numbers
+
+
+def test_intervals_of_a_simpler_law_hold_what_a_whole_law_that_is_turned_away_says(monkeypatch):
+    """Friction without its rise near rest is larger than the friction, and takes up damping."""
+    damping = {"intercept_n_s_per_mm": 0.5, "slope_n_s_per_mm_per_kpa": 0.0}
+    known = imposed(force_sensor=SENSOR, symmetric_damping=damping)
+    table = {"presliding_um": 50.0, "rise_n": 2.0, "stribeck_speed_mm_per_s": 20.0}
+    hidden = {"contact_friction": {"force_n": 40.0} | table}
+    logs = trials(strokes=(0.03, 0.06), symmetric_damping=damping, **hidden)
+    bench = FitProblem(
+        logs, known, free_parameters(known), (white_noise(0.3),) * len(known.rig.signals)
+    )
+    dry = next(each for each in candidate_effects(known) if each.name == "contact_friction")
+    whole = bench.fit(known, (dry,), {dry.name: np.array([38.0, 60.0, 1.0, 10.0])})
+    assert whole is not None
+    assert nested(bench, whole, (dry,)).fit is whole
+    monkeypatch.setattr(nested_laws, "_asked_for", lambda *_: False)
+    less = nested(bench, whole, (dry,))
+    assert {path.partition(".")[2] for path in less.undetermined} == {
+        "rise_n",
+        "stribeck_speed_mm_per_s",
+    }
+    for path, true in (
+        ("contact_friction.force_n", 40.0),
+        ("symmetric_damping.intercept_n_s_per_mm", 0.5),
+    ):
+        value, error = less.fit.estimate(path)
+        assert abs(value - true) > 5.0 * error
+        low, high = less.fit.interval(path)
+        assert low < true < high
