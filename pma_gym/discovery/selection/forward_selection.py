@@ -24,6 +24,7 @@ from pma_gym.discovery.selection.candidate_fits import (
     better,
     carries_the_rest,
     cost,
+    is_further_term,
     refit,
     without_idle,
 )
@@ -215,6 +216,8 @@ def _likeliest(stage: Stage, first: Stage) -> str | None:
         return None
     name = min(worth, key=lambda each: cost(worth[each]))
     gain = stage.before.chi_square - stage.fits[name].chi_square
+    if gain >= LEAST_GAIN and is_further_term(name, stage.before.names):
+        return name
     return name if _is_worth(first, stage, gain) else None
 
 

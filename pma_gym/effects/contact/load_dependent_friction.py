@@ -97,6 +97,7 @@ LOAD_DEPENDENT_FRICTION = Effect(
     release_path=release_path,
     held=("presliding",),
     scanned=("presliding",),
+    terms=(("carried_share",),),
     signature=_SIGNATURE,
 )
 JOINT_LOAD_FRICTION = Effect(
@@ -110,5 +111,6 @@ JOINT_LOAD_FRICTION = Effect(
     release_path=release_path,
     held=("presliding",),
     scanned=("presliding",),
+    terms=(("carried_share",),),
     signature=_SIGNATURE,
 )
