@@ -71,10 +71,12 @@ def test_friction_by_load_has_a_share_of_what_is_carried_only_where_it_shows(car
         logs.append(replace(asked, measurements={"angle": noisy}))
     noise = (white_noise(NOISE_RAD),) * len(model.rig.signals)
     problem = FitProblem(logs, model, free_parameters(model), noise)
-    found = next(e for e in candidate_effects(model, None, logs) if e.name == "joint_load_friction")
-    fit = problem.fit(model, (found,), {found.name: np.array([28.0, 5.0])})
+    friction = next(
+        e for e in candidate_effects(model, None, logs) if e.name == "joint_load_friction"
+    )
+    fit = problem.fit(model, (friction,), {friction.name: np.array([28.0, 5.0])})
     assert fit is not None
-    less = nested(problem, fit, (found,))
+    less = nested(problem, fit, (friction,))
     assert (set(less.undetermined) == {"joint_load_friction.carried_share_percent"}) is left
     share = less.fit.estimate("joint_load_friction.drive_share_percent")[0]
     assert share == pytest.approx(30.0, rel=0.02)
