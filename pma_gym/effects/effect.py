@@ -260,6 +260,10 @@ class Effect:
         path = self.rate_independent_law
         return self.name == other.name or (path is not None and path is other.rate_independent_law)
 
+    def is_further_term(self, other: "Effect") -> bool:
+        """Whether both are terms of one law at one place, as a seal's friction has them."""
+        return self.name != other.name and self.port == other.port and self.shares_law(other)
+
     def laws(self) -> Iterator[Callable]:
         """All laws of the effect: its law, rate, path and event functions, those that it has."""
         of_memory = (

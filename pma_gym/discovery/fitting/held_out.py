@@ -18,6 +18,9 @@ from pma_gym.discovery.preparation.splits import folds, stretches
 
 Array = NDArray[np.float64]
 
+Fit = tuple[Fitted, Sequence[CandidateEffect]]
+"""A fit of all trials, and the candidates in it."""
+
 
 @dataclass(frozen=True)
 class HeldOutMisfit:
@@ -74,6 +77,22 @@ def held_out_misfit(
         for k, i in enumerate(left_out):
             readings[i], chi_square[i] = held.readings[k], held.chi_square[k]
     return HeldOutMisfit(readings, chi_square, np.array(deviances))
+
+
+def is_asked_for(problem: FitProblem, whole: Fit, simpler: Fit) -> bool:
+    """Whether most trials ask for a whole law when left out; yes where none can be left out.
+
+    They are counted, not added up: one trial that a fit of the others runs away in outweighs all.
+
+    Args:
+        problem: the trials.
+        whole: the fit with the whole law, and the candidates in it.
+        simpler: the same with a simpler one.
+    """
+    theirs, others = (held_out_misfit(problem, *each) for each in (whole, simpler))
+    if theirs is None or others is None:
+        return True
+    return bool(np.mean(theirs.chi_square < others.chi_square) > 0.5)
 
 
 def _unseen_stretches(

@@ -1,6 +1,6 @@
 """Fit candidates beside the effects selected so far, with restarts from better parameters."""
 
-from collections.abc import Callable, Collection, Iterable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -60,17 +60,6 @@ def cost(fit: Fitted) -> float:
 def carries_the_rest(problem: FitProblem, before: Fitted, gain: float) -> bool:
     """Whether a fall of chi-square is most of what a fit leaves, where it leaves much."""
     return problem.left(before) > MUCH and gain > MOST_OF * (before.chi_square - problem.count)
-
-
-def is_further_term(name: str, others: Iterable[str]) -> bool:
-    """Whether an effect is a term of the law of one of others, at one place with it.
-
-    What it explains is no error of the other's law: a seal rubs without pressure too.
-    """
-    known = [CATALOGUE[each] for each in (name, *others) if each in CATALOGUE]
-    return name in CATALOGUE and any(
-        known[0].port == other.port and known[0].shares_law(other) for other in known[1:]
-    )
 
 
 def starting_values(candidate: CandidateEffect, *fits: Fitted) -> np.ndarray:
@@ -390,7 +379,9 @@ def without_idle(
             continue
         missed = without.chi_square - best.chi_square
         least = 0.02 * max(worst - best.chi_square, 0.0)
-        if is_further_term(candidate.name, [each.name for each in others]):
+        law = CATALOGUE[candidate.effect]
+        if any(law.is_further_term(CATALOGUE[each.effect]) for each in others):
+            # What it explains is no error of the other's law.
             least = 0.0
         idle = missed < max(30.0, least)
         if idle and not carries_the_rest(problem, without, missed):

@@ -24,11 +24,11 @@ from pma_gym.discovery.selection.candidate_fits import (
     better,
     carries_the_rest,
     cost,
-    is_further_term,
     refit,
     without_idle,
 )
 from pma_gym.discovery.selection.exchanged_effects import Round, exchanged
+from pma_gym.discovery.selection.further_terms import further_terms
 from pma_gym.discovery.selection.instead_of_terms import instead_of_term
 from pma_gym.discovery.selection.rugged_fits import is_rugged, settled
 from pma_gym.discovery.selection.scanned_parameters import with_scanned
@@ -177,8 +177,12 @@ def _with_added(
         taken = {candidate.name for candidate in chosen}
         rest = [candidate for candidate in candidates if candidate.name not in taken]
         stage = stage_of(problem, best, chosen, rest, seed, journal, progress)
+        added = _likeliest(stage, stages[0] if stages else stage)
+        if added is None and chosen and stage.before is best:
+            terms = further_terms(problem, best, chosen, stage, journal)
+            stage = replace(stage, fits={**stage.fits, **terms})
+            added = min(terms, key=lambda each: cost(terms[each]), default=None)
         stages.append(stage)
-        added = _likeliest(stage, stages[0])
         if added is None:
             worth = partial(_is_worth, stages[0])
             other = instead_of_term(problem, best, chosen, rest, seed, journal, progress, worth)
@@ -216,8 +220,6 @@ def _likeliest(stage: Stage, first: Stage) -> str | None:
         return None
     name = min(worth, key=lambda each: cost(worth[each]))
     gain = stage.before.chi_square - stage.fits[name].chi_square
-    if gain >= LEAST_GAIN and is_further_term(name, stage.before.names):
-        return name
     return name if _is_worth(first, stage, gain) else None
 
 

@@ -23,7 +23,7 @@ import numpy as np
 from pma_gym.discovery.fitting.covariance import covariance
 from pma_gym.discovery.fitting.fit_problem import FitProblem, Fitted
 from pma_gym.discovery.fitting.free_parameters import at_limit, unit
-from pma_gym.discovery.fitting.held_out import held_out_misfit
+from pma_gym.discovery.fitting.held_out import is_asked_for
 from pma_gym.discovery.result.estimates import Undetermined
 from pma_gym.discovery.selection.candidate_fits import cost
 from pma_gym.discovery.selection.profile_limits import limits
@@ -149,7 +149,9 @@ def _tied(problem: FitProblem, state: Nested, place: int) -> Nested:
         for whole in _whole_laws(problem, state, simpler, place, tie):
             if not _explains_more(whole, simpler, tie):
                 continue
-            if _ended(problem, whole, tie.path) or not _asked_for(problem, whole, simpler):
+            if _ended(problem, whole, tie.path) or not is_asked_for(
+                problem, (whole.fit, whole.chosen), (simpler.fit, simpler.chosen)
+            ):
                 fit = _as_wide(fit, whole.fit)
                 continue
             # A simpler law that is far from the trials gives the other parameters false values.
@@ -223,17 +225,6 @@ def _range(problem: FitProblem, state: Nested, path: str) -> tuple[float, float]
     whitened = problem.whitened_at(state.fit, state.chosen)
     at = [free.path for free in whitened.free].index(path)
     return float(whitened.lower[at]), float(whitened.upper[at])
-
-
-def _asked_for(problem: FitProblem, whole: Nested, simpler: Nested) -> bool:
-    """Whether most trials ask for the whole law when left out; yes where none can be left out.
-
-    They are counted, not added up: one trial that a fit of the others runs away in outweighs all.
-    """
-    theirs, others = (held_out_misfit(problem, each.fit, each.chosen) for each in (whole, simpler))
-    if theirs is None or others is None:
-        return True
-    return bool(np.mean(theirs.chi_square < others.chi_square) > 0.5)
 
 
 def _place(chosen: Chosen, path: str) -> int:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from pma_gym.data.trial import Trial
+from pma_gym.discovery.fitting import held_out
 from pma_gym.discovery.fitting.fit_problem import FitProblem
 from pma_gym.discovery.fitting.free_parameters import free_parameters
 from pma_gym.discovery.fitting.held_out import HeldOutMisfit
@@ -93,7 +94,7 @@ def test_a_law_that_ended_below_one_number_is_begun_again_at_it():
 
 def test_a_law_with_a_number_at_an_end_of_its_range_is_left(monkeypatch):
     """Readings left out may ask for a static friction of 0: it stands for something else."""
-    monkeypatch.setattr(nested_laws, "_asked_for", lambda *_: True)
+    monkeypatch.setattr(nested_laws, "is_asked_for", lambda *_: True)
     bench, fit = fit_of(0.0, 12.0, 3.0, (0.0, 12.0, 3.0))
     place = fit.paths.index(STATIC)
     at_end = replace(fit, values=np.where(np.arange(len(fit.values)) == place, 0.0, fit.values))
@@ -107,7 +108,7 @@ def test_a_law_with_a_number_at_an_end_of_its_range_is_left(monkeypatch):
 )
 def test_a_static_level_that_no_motion_shows_leaves_the_law(speed, left, monkeypatch):
     """A Stribeck speed that may be the least there is, beside a chi-square that is rugged in it."""
-    monkeypatch.setattr(nested_laws, "_asked_for", lambda *_: True)
+    monkeypatch.setattr(nested_laws, "is_asked_for", lambda *_: True)
     monkeypatch.setattr(nested_laws, "_left", lambda *_: None)
     bench, fit = fit_of(12.0, 12.0, 5.0, (14.0, 12.0, 3.0))
     values, covariance = fit.values.copy(), fit.covariance.copy()
@@ -123,7 +124,7 @@ def test_a_static_level_that_no_motion_shows_leaves_the_law(speed, left, monkeyp
 
 def test_a_static_friction_below_the_dynamic_one_leaves_the_law(monkeypatch):
     """No contact holds less than it drags, even where that form of the law explains more."""
-    monkeypatch.setattr(nested_laws, "_asked_for", lambda *_: True)
+    monkeypatch.setattr(nested_laws, "is_asked_for", lambda *_: True)
     bench, fit = fit_of(6.0, 12.0, 60.0, (6.0, 12.0, 60.0))
     assert fit.estimate(STATIC)[0] < 0.8 * fit.estimate(DYNAMIC)[0]
     less = nested(bench, fit, (DRY,))
@@ -189,7 +190,7 @@ def test_the_whole_law_stays_where_most_readings_left_out_ask_for_it(monkeypatch
         chi_square = np.where(np.arange(3) < asking, 1.0, 3.0) if whole else np.full(3, 2.0)
         return HeldOutMisfit([], chi_square, np.empty(0))
 
-    monkeypatch.setattr(nested_laws, "held_out_misfit", left_out)
+    monkeypatch.setattr(held_out, "held_out_misfit", left_out)
     assert len(nested(bench, fit, (DRY,)).chosen[0].fitted_paths) == numbers
 
 
@@ -207,7 +208,7 @@ def test_intervals_of_a_simpler_law_hold_what_a_whole_law_that_is_turned_away_sa
     whole = bench.fit(known, (dry,), {dry.name: np.array([38.0, 60.0, 1.0, 10.0])})
     assert whole is not None
     assert nested(bench, whole, (dry,)).fit is whole
-    monkeypatch.setattr(nested_laws, "_asked_for", lambda *_: False)
+    monkeypatch.setattr(nested_laws, "is_asked_for", lambda *_: False)
     less = nested(bench, whole, (dry,))
     assert {path.partition(".")[2] for path in less.undetermined} == {
         "rise_n",

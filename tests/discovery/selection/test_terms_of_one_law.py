@@ -11,26 +11,31 @@ import pytest
 
 from pma_gym import Plant
 from pma_gym.data.trial import Trial
+from pma_gym.discovery import diagnose
 from pma_gym.discovery.fitting.fit_problem import FitProblem
 from pma_gym.discovery.fitting.free_parameters import free_parameters
 from pma_gym.discovery.fitting.journal import Journal
 from pma_gym.discovery.preparation.noise import white_noise
 from pma_gym.discovery.screening.candidates import candidate_effects
 from pma_gym.discovery.selection import candidate_fits
-from pma_gym.discovery.selection.candidate_fits import is_further_term, without_idle
+from pma_gym.discovery.selection.candidate_fits import without_idle
 from pma_gym.discovery.selection.nested_laws import nested
+from pma_gym.effects import CATALOGUE
+from pma_gym.effects.effect import Effect
 from tests.discovery.selection.test_unscored_fits import GIVEN, NOISE_RAD, RATE_HZ, joint
-from tests.discovery.test_imposed_motion import KNOWN, trials
+from tests.discovery.test_imposed_motion import KNOWN, sizes_of, trials
 
 SEAL = ("pressure_friction", "contact_friction")
 
 
 def test_friction_by_pressure_is_a_term_of_the_friction_of_a_rod_alone():
-    assert is_further_term("contact_friction", ["pressure_friction"])
-    assert is_further_term("pressure_friction", ["backlash", "contact_friction"])
-    assert not is_further_term("cogging", SEAL)
-    # Dry friction of a slide and friction by the load of its gear act at two places.
-    assert not is_further_term("coulomb_friction", ["load_dependent_friction"])
+    pairs = [
+        {one.name, other.name}
+        for one in CATALOGUE.values()
+        for other in CATALOGUE.values()
+        if one.is_further_term(other)
+    ]
+    assert pairs == [set(SEAL)] * 2
 
 
 def test_friction_without_pressure_stays_however_small_beside_the_whole_gain(monkeypatch):
@@ -54,7 +59,7 @@ def test_friction_without_pressure_stays_however_small_beside_the_whole_gain(mon
     monkeypatch.setattr(candidate_fits, "carries_the_rest", lambda *_: False)
     journal = Journal(None, logs, KNOWN, "")
     assert without_idle(problem, both, chosen, refitted, journal)[0] == chosen
-    monkeypatch.setattr(candidate_fits, "is_further_term", lambda *_: False)
+    monkeypatch.setattr(Effect, "is_further_term", lambda *_: False)
     assert without_idle(problem, both, chosen, refitted, journal)[0] != chosen
 
 
@@ -80,3 +85,21 @@ def test_friction_by_load_has_a_share_of_what_is_carried_only_where_it_shows(car
     assert (set(less.undetermined) == {"joint_load_friction.carried_share_percent"}) is left
     share = less.fit.estimate("joint_load_friction.drive_share_percent")[0]
     assert share == pytest.approx(30.0, rel=0.02)
+
+
+@pytest.mark.parametrize(("force", "slope"), [(0.5, 3e-3), (1.0, 2e-3), (1.0, 0.0), (0.0, 3e-3)])
+def test_friction_of_a_seal_has_both_parts_where_both_are_there_and_one_where_one_is(force, slope):
+    """Each changes less beside the other than is looked for by itself."""
+    hidden = {
+        "contact_friction": {"force_n": force, "presliding_um": 100.0},
+        "pressure_friction": {"slope_n_per_kpa": slope, "presliding_um": 100.0},
+    }
+    given = trials((250e3, 300e3, 350e3, 400e3), (0.02,) * 4, **hidden)
+    diagnosis = diagnose(given, KNOWN, propose=False)
+    sizes = sizes_of(diagnosis)
+    there = {"contact_friction.force_n": force, "pressure_friction.slope_n_per_kpa": slope}
+    there = {path: size for path, size in there.items() if size}
+    named = {path for path in sizes if not path.endswith("presliding_um")}
+    assert named == set(there), diagnosis.sentence
+    for path, size in there.items():
+        assert sizes[path] == pytest.approx(size, rel=0.03)
