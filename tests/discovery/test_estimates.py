@@ -7,7 +7,7 @@ import pytest
 
 from pma_gym.discovery.answer.estimates import _shifts_beside
 from pma_gym.discovery.fitting.fit_problem import Fitted
-from pma_gym.discovery.selection.forward_selection import LEAST_GAIN
+from pma_gym.discovery.selection.candidate_fits import LEAST_GAIN
 
 MASS, DRAG, FRICTION = "slide.mass_kg", "drag.coefficient", "friction.force"
 

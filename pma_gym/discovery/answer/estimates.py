@@ -8,7 +8,7 @@ from pma_gym.discovery.fitting.fit_problem import SURE, Fitted
 from pma_gym.discovery.fitting.free_parameters import at_limit, unit
 from pma_gym.discovery.result.estimates import Estimate, NamedEffect
 from pma_gym.discovery.screening.score_test import ScreeningScore
-from pma_gym.discovery.selection.forward_selection import LEAST_GAIN
+from pma_gym.discovery.selection.candidate_fits import LEAST_GAIN
 from pma_gym.discovery.selection.stages import Stage
 from pma_gym.discovery.verdict.findings import Findings
 

@@ -48,6 +48,9 @@ MUCH, MOST_OF = 1.05, 0.8
 """Noises left from which on another effect counts that carries this share of what is left beyond
 the noise: an approximate law leaves less, and no other law carries that."""
 
+LEAST_GAIN = 30.0
+"""Least fall of chi-square by an effect that is added, or stays. An assumption."""
+
 COST = 3.0
 """Log-likelihood that a parameter costs: half the logarithm of some 400 effective readings."""
 
@@ -383,7 +386,7 @@ def without_idle(
         if any(law.is_further_term(CATALOGUE[each.effect]) for each in others):
             # What it explains is no error of the other's law.
             least = 0.0
-        idle = missed < max(30.0, least)
+        idle = missed < max(LEAST_GAIN, least)
         if idle and not carries_the_rest(problem, without, missed):
             return others, refit(problem, without, others, journal)
     return chosen, best

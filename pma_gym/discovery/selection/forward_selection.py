@@ -20,6 +20,7 @@ from pma_gym.discovery.fitting.short_pieces import in_short_pieces
 from pma_gym.discovery.result.estimates import Undetermined
 from pma_gym.discovery.screening.residuals import reestimated_noise
 from pma_gym.discovery.selection.candidate_fits import (
+    LEAST_GAIN,
     MOST_LEFT,
     better,
     carries_the_rest,
@@ -38,9 +39,6 @@ from pma_gym.discovery.selection.tried_candidates import Progress
 SECOND_SHARE, SURE_SHARE = 0.12, 0.02
 """Least share of the first effect's gain that another must bring: what a law of the catalogue
 misses of its real likeness is of that order; and the same where the residual is surely no noise."""
-
-LEAST_GAIN = 30.0
-"""Least fall of chi-square by an effect that is added. An assumption."""
 
 BEGINNINGS = 3
 """How often the selection begins anew from a better refitted model."""

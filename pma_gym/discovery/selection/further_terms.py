@@ -10,12 +10,9 @@ from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
 from pma_gym.discovery.fitting.fit_problem import FitProblem, Fitted
 from pma_gym.discovery.fitting.held_out import is_asked_for
 from pma_gym.discovery.fitting.journal import Journal
-from pma_gym.discovery.selection.candidate_fits import cost, fitted
+from pma_gym.discovery.selection.candidate_fits import LEAST_GAIN, cost, fitted
 from pma_gym.discovery.selection.stages import Stage
 from pma_gym.effects import CATALOGUE
-
-LEAST = 30.0
-"""Least fall of chi-square by a further term. An assumption, as of an effect by itself."""
 
 Chosen = tuple[CandidateEffect, ...]
 
@@ -41,7 +38,7 @@ def further_terms(
         fit = stage.fits.get(new.name)
         if fit is None:
             fit = fitted(problem, stage.baseline, best, chosen, score, journal)
-        if fit is None or best.chi_square - fit.chi_square < LEAST or cost(fit) > cost(best):
+        if fit is None or best.chi_square - fit.chi_square < LEAST_GAIN or cost(fit) > cost(best):
             continue
         if is_asked_for(problem, (fit, (*chosen, new)), (best, chosen)):
             terms[new.name] = fit
