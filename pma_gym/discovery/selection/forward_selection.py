@@ -4,8 +4,8 @@ In each round (`stages`) every candidate is scored; what passes the gate is fitt
 model's parameters; the likeliest is added; then the same again beside it. Each effect is then left
 out once, and stays out if the fit is as good without it, or is exchanged for another that explains
 more beside the rest. Where nothing passes any more, further terms of the laws that were added are
-fitted (`further_terms`). Where a free rig is far from its trials all this happens in short pieces of
-them first, and goes on in the trials beside what holds there. The noise is estimated again only
+fitted (`further_terms`). Where a free rig is far from its trials all this happens in short pieces
+of them first, and goes on in the trials beside what holds there. The noise is estimated again only
 when all effects are selected: before, an autoregression would take the next effect for noise.
 """
 
