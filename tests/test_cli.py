@@ -250,7 +250,9 @@ def test_info_shows_a_models_parameters(run):
     assert "no model 'nothing'" in err
 
 
-def test_the_command_loads_neither_plots_nor_torch():
-    code = "import sys, pma_gym.cli; print(sorted({'matplotlib', 'torch'} & set(sys.modules)))"
+@pytest.mark.parametrize("module", ["pma_gym", "pma_gym.cli"])
+def test_a_start_loads_no_slow_library(module):
+    slow = {"control", "matplotlib", "scipy", "torch"}
+    code = f"import sys, {module}; print(sorted({slow} & set(sys.modules)))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"

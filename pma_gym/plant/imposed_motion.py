@@ -9,7 +9,6 @@ The motion is the natural cubic spline s that minimises
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import solveh_banded
 
 Array = NDArray[np.float64]
 
@@ -52,6 +51,8 @@ def _continued(time: Array, values: Array, bandwidth: float) -> tuple[Array, Arr
 
 def _spline(time: Array, values: Array, bandwidth: float) -> tuple[Array, Array, Array]:
     """The smoothing spline of a record and its derivatives, as `smoothed`."""
+    from scipy.linalg import solveh_banded  # Half of this package's import, for one kind of rig.
+
     rows = len(time)
     if rows < 3:
         rate = np.zeros(rows) if rows < 2 else np.full(2, np.diff(values) / np.diff(time))
