@@ -1,6 +1,9 @@
 """Results on disk: each file whole or not at all, in a folder made for it."""
 
+import json
+from collections.abc import Iterator, Mapping
 from pathlib import Path
+from typing import Any
 
 from pma_gym.files import replace_file
 
@@ -23,3 +26,32 @@ def write_bytes(path: Path, content: bytes) -> None:
 def write_text(path: Path, text: str) -> None:
     """As `write_bytes`, for text in UTF-8; bytes of file names that are none become escapes."""
     write_bytes(path, text.encode("utf-8", "backslashreplace"))
+
+
+def toml_document(comment: str, schema: int, tables: Mapping[str, Any]) -> str:
+    """Write nested tables of numbers, texts and lists as TOML, one headed table a leaf.
+
+    Args:
+        comment: what the file is, its first line.
+        schema: version of its form.
+        tables: tables by bare keys; sorted by the outermost.
+
+    >>> print(toml_document("Gains", 1, {"station": {"pid": {"lead_s": [0.1, 2]}}}), end="")
+    # Gains
+    schema = 1
+    <BLANKLINE>
+    [station.pid]
+    lead_s = [0.1, 2]
+    """
+
+    def lines(name: str, table: Mapping[str, Any]) -> Iterator[str]:
+        # Lists, texts and numbers are written in JSON as in TOML.
+        values = [f"{k} = {json.dumps(v)}" for k, v in table.items() if not isinstance(v, Mapping)]
+        if values:
+            yield "\n".join(["", f"[{name}]", *values])
+        for key, inner in table.items():
+            if isinstance(inner, Mapping):
+                yield from lines(f"{name}.{key}", inner)
+
+    parts = [line for name in sorted(tables) for line in lines(name, tables[name])]
+    return "\n".join([f"# {comment}", f"schema = {schema}", *parts]) + "\n"

@@ -35,7 +35,7 @@ DEFAULTS = {
     "rotation": Settings(0.6, 0.35),
     "contraction": Settings(0.5, 0.45),
 }
-"""Settings by kind of task for what `controllers/design/designs.json` does not give."""
+"""Settings by kind of task for what `controllers/design/designs.toml` does not give."""
 
 
 class ADRC(ObserverFeedback[Settings]):

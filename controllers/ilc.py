@@ -41,7 +41,7 @@ DEFAULTS = {
     "rotation": Settings(3.0, 0.3, 0.3),
     "contraction": Settings(3.0, 0.3, 0.3),
 }
-"""Settings by kind of task for what `controllers/design/designs.json` does not give."""
+"""Settings by kind of task for what `controllers/design/designs.toml` does not give."""
 
 LEAST_STEPS = 10
 """Fewest steps of a trial that are learned from: others say nothing of a motion."""

@@ -63,7 +63,7 @@ DEFAULTS = {
     "rotation": Settings(0.4, 0.05, 0.05),
     "contraction": Settings(0.2, 0.05, 0.1),
 }
-"""Settings by kind of task, where `designs.json` has none."""
+"""Settings by kind of task, where `designs.toml` has none."""
 
 
 class LQG:

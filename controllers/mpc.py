@@ -39,7 +39,7 @@ DEFAULTS = {
     "rotation": Settings(0.3, 5.0, 1.0),
     "contraction": Settings(0.3, 10.0, 1.0, 0.3),
 }
-"""Settings by kind of task where `controllers/design/designs.json` has none."""
+"""Settings by kind of task where `controllers/design/designs.toml` has none."""
 
 BOUNDS = {"effort": (1e-2, 1e2), "wander": (0.5, 100.0), "jolt": (0.1, 10.0)}
 """Within which a design searches."""

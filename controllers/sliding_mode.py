@@ -40,7 +40,7 @@ DEFAULTS = {
     "rotation": Settings(1.5, 0.35, 0.03),
     "contraction": Settings(1.2, 0.4, 0.05),
 }
-"""Settings by kind of task for what `controllers/design/designs.json` does not give."""
+"""Settings by kind of task for what `controllers/design/designs.toml` does not give."""
 
 
 class Surface(NamedTuple):

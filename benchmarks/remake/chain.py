@@ -17,8 +17,8 @@ from benchmarks.suites.frozen import frozen_suite, suite_names
 from benchmarks.tuning.design import designable
 
 MODEL = Path("pma_gym/models/station.toml")
-GAINS = Path("controllers/design/gains.json")
-DESIGNS = Path("controllers/design/designs.json")
+GAINS = Path("controllers/design/gains.toml")
+DESIGNS = Path("controllers/design/designs.toml")
 POLICIES = Path("controllers/policies/shipped")
 SUITES = Path("benchmarks/suites")
 

@@ -21,7 +21,6 @@ command goes on with those that are missing. Single designs are made anew by `--
 
 import difflib
 import inspect
-import json
 import math
 import sys
 from collections.abc import Iterable, Iterator, Mapping
@@ -37,7 +36,7 @@ from scipy.stats.qmc import LatinHypercube, scale
 
 from benchmarks.executors.choice import local
 from benchmarks.executors.executor import run_all
-from benchmarks.files import write_text
+from benchmarks.files import toml_document, write_text
 from benchmarks.runner.rollout import Rollout, rollout
 from benchmarks.suites.frozen import frozen_suite
 from benchmarks.suites.stations import draw_station
@@ -46,9 +45,8 @@ from benchmarks.tuning.choice import chosen
 from benchmarks.tuning.cost import TARGETS, VARIATION_WEIGHT_S_PER_V
 from benchmarks.tuning.tune import CONTROLLERS as TUNED
 from controllers import CONTROLLERS
-from controllers.design.designs import KINDS, SCHEMA, loop_name
-from pma_gym.document_shape import check_shape
-from pma_gym.documents import read_json
+from controllers.design.designs import KINDS, SCHEMA, loop_name, read_settings
+from pma_gym.document_shape import Real, check_shape
 from pma_gym.envs import PMAEnv
 from pma_gym.metrics import rmse
 from pma_gym.plant.model import Model
@@ -67,6 +65,8 @@ CONTRACTION_TARGET = 0.3e-3
 regulator being slower than the motor by about that much. An assumption."""
 
 DIGITS = 3
+
+HEAD = "Settings by controller, loop and kind of task: python -m benchmarks design"
 
 
 class DesignError(ValueError):
@@ -147,7 +147,7 @@ def run_design(
     """
     document = _read(out)
     asked = problems_of(controllers or designable(), seed, only)
-    problems = [s for s in asked if recompute or s.name not in document["provenance"]]
+    problems = [s for s in asked if recompute or not _is_in(document, s)]
     if len(problems) < len(asked):
         there = len(asked) - len(problems)
         print(f"{out} has {there} of {len(asked)} designs asked for; --recompute makes them anew")
@@ -323,36 +323,36 @@ def _training(suite: FrozenSuite, number: int) -> Model:
 
 
 def _read(path: Path) -> dict[str, Any]:
-    document = {"schema": SCHEMA, "controllers": {}, "provenance": {}}
-    if path.exists():
-        try:
-            content = read_json(path)
-            check_shape(content, {"controllers?": {"*": {"*": dict}}, "provenance?": dict})
-            document |= content
-        except (ValueError, TypeError) as error:
-            raise DesignError(
-                f"{path} is no file of settings ({error}); delete it or name another"
-            ) from error
-    if document["schema"] != SCHEMA:
-        raise DesignError(f"{path} must have schema {SCHEMA}; delete it or name another")
-    return document
+    if not path.exists():
+        return {}
+    try:
+        tables = read_settings(path, SCHEMA, "design")
+        check_shape(tables, {"*": {"*": {"*": {"provenance": str, "*?": Real()}}}})
+    except ValueError as error:
+        raise DesignError(
+            f"{path} is no file of settings ({error}); delete it or name another"
+        ) from error
+    return tables
+
+
+def _is_in(document: Mapping[str, Any], problem: DesignProblem) -> bool:
+    """Whether a file has a design: each says of which suite's loop it is."""
+    return any(
+        kinds.get(problem.kind, {"provenance": ""})["provenance"].startswith(f"{problem.suite} ")
+        for kinds in document.get(problem.controller, {}).values()
+    )
 
 
 def _write(
     out: Path, document: dict[str, Any], problem: DesignProblem, result: DesignResult
 ) -> None:
-    loops = document["controllers"].setdefault(problem.controller, {})
-    loops.setdefault(result.loop, {})[problem.kind] = dict(result.values)
-    document["provenance"][problem.name] = {
-        "written_by": "benchmarks/tuning/design.py",
-        "suite_version": frozen_suite(problem.suite).version,
-        "training_seed": getattr(frozen_suite(problem.suite).recipe, "training_seed", None),
-        "seed": problem.seed,
-        "stations": STATIONS,
-        "evaluations": 1 + SCATTERED + EVALUATIONS,
-        "cost_of_defaults": round(result.first_cost, 4),
-        "cost": round(result.cost, 4),
-    }
-    for part in ("controllers", "provenance"):
-        document[part] = dict(sorted(document[part].items()))
-    write_text(out, json.dumps(document, indent=2) + "\n")
+    suite = frozen_suite(problem.suite)
+    provenance = (
+        f"{problem.suite} version {suite.version}, {STATIONS} stations of training seed "
+        f"{getattr(suite.recipe, 'training_seed', None)}, seed {problem.seed}, "
+        f"{1 + SCATTERED + EVALUATIONS} evaluations: cost {result.cost:.4f}, of the defaults "
+        f"{result.first_cost:.4f}"
+    )
+    loops = document.setdefault(problem.controller, {})
+    loops.setdefault(result.loop, {})[problem.kind] = {"provenance": provenance, **result.values}
+    write_text(out, toml_document(HEAD, SCHEMA, document))

@@ -29,7 +29,6 @@ on from there.
 """
 
 import hashlib
-import json
 import platform
 import sys
 from functools import partial
@@ -44,17 +43,17 @@ from scipy.optimize import minimize
 from benchmarks.executors.choice import local
 from benchmarks.executors.executor import run_all
 from benchmarks.executors.failures import ProcessDied
-from benchmarks.files import write_text
+from benchmarks.files import toml_document, write_text
 from benchmarks.tuning.choice import chosen
 from benchmarks.tuning.cost import Cost
 from benchmarks.tuning.finished_rows import KeptRows, name_of
 from benchmarks.tuning.job import Job
 from benchmarks.tuning.loop import lambda_tuning
+from controllers.design.designs import read_settings
 from controllers.design.gains import GAINS_FILE, SCHEMA, Gains, column_names
 from controllers.feedforward_pid import FeedforwardPID
 from controllers.pid import PID
-from pma_gym.document_shape import Whole, check_shape
-from pma_gym.documents import read_json
+from pma_gym.document_shape import check_shape
 from pma_gym.plant.model import Model, dump_model, load_model
 from pma_gym.plant.plant import Plant
 from pma_gym.tasks import EVERY_TASK
@@ -72,6 +71,7 @@ PRESSURES_KPA = {
 LOOPS = ((100.0, 0.0), (50.0, 0.02))
 """Control rates (Hz), and how late commands are with each (s)."""
 
+HEAD = "Gains by model, loop, kind of task and controller: python -m benchmarks tune"
 CONTROLLERS = (PID.name, FeedforwardPID.name)
 FILTER_S = 0.005
 EVALUATIONS = 100
@@ -107,7 +107,7 @@ def run_tune(
     """
     known, document = load_model(model), _read(out)
     rows = table_rows(known, seed, only)
-    kept = KeptRows(out, _provenance(known, seed) | {"evaluations": EVALUATIONS})
+    kept = KeptRows(out, {"made": _provenance(known, seed), "evaluations": EVALUATIONS})
     left = [row for row in rows if name_of(row) not in kept.rows]
     if len(left) < len(rows):
         print(
@@ -119,12 +119,11 @@ def run_tune(
         print(_interrupted(done, len(rows), kept.path, out), file=sys.stderr)
         return False
     tables = _tables(rows, [kept.rows[name_of(row)] for row in rows])
-    provenance = {
-        loop: dict.fromkeys(kinds, _provenance(known, seed)) for loop, kinds in tables.items()
-    }
-    _merge(document["models"].setdefault(known.name, {}), tables)
-    _merge(document["provenance"].setdefault(known.name, {}), provenance)
-    _write(out, document)
+    for loop, kinds in tables.items():
+        for kind, controllers in kinds.items():
+            table = {"provenance": _provenance(known, seed)} | controllers
+            document.setdefault(known.name, {}).setdefault(loop, {})[kind] = table
+    write_text(out, toml_document(HEAD, SCHEMA, document))
     kept.forget()
     return True
 
@@ -146,12 +145,6 @@ def table_rows(model: Model, seed: int, only: str) -> list[Job]:
     ]
     wanted = chosen((f"{row.loop}/{row.kind}" for row in rows), only)
     return [row for row in rows if f"{row.loop}/{row.kind}" in wanted]
-
-
-def _merge(into: dict[str, Any], tables: dict[str, Any]) -> None:
-    """Put new entries by loop and kind into a document's."""
-    for loop, kinds in tables.items():
-        into.setdefault(loop, {}).update(kinds)
 
 
 def _interrupted(done: int, total: int, kept: Path, out: Path) -> str:
@@ -238,34 +231,22 @@ def _tables(jobs: list[Job], results: list[tuple[Gains, float]]) -> dict[str, An
     return tables
 
 
-def _provenance(model: Model, seed: int) -> dict[str, Any]:
-    return {
-        "written_by": "benchmarks/tuning/tune.py",
-        "model_sha256": hashlib.sha256(dump_model(model).encode()).hexdigest(),
-        "seed": seed,
-        "versions": {
-            "python": platform.python_version(),
-        }
-        | {name: version(name) for name in ("numpy", "scipy", "llvmlite")},
-    }
+def _provenance(model: Model, seed: int) -> str:
+    """What gains depend on, in one line."""
+    digest = hashlib.sha256(dump_model(model).encode()).hexdigest()[:16]
+    versions = [f"Python {platform.python_version()}"]
+    versions += [f"{name} {version(name)}" for name in ("numpy", "scipy", "llvmlite")]
+    return f"tuned on the model {digest}, seed {seed}; {' '.join(versions)}"
 
 
 def _read(path: Path) -> dict[str, Any]:
     if not path.exists():
-        return {"schema": SCHEMA, "provenance": {}, "models": {}}
+        return {}
     try:
-        document = read_json(path)
-        check_shape(document, {"schema": Whole()})
-        if document["schema"] == SCHEMA:
-            check_shape(document, {"provenance": dict, "models": {"*": dict}})
-            return document
-    except (ValueError, KeyError, TypeError) as error:
+        tables = read_settings(path, SCHEMA, "tune")
+        check_shape(tables, {"*": {"*": {"*": dict}}})
+    except ValueError as error:
         raise ValueError(
             f"{path} is no file of gains ({error}); delete it or name another"
         ) from error
-    raise ValueError(f"{path} must have schema {SCHEMA}; delete it or name another")
-
-
-def _write(path: Path, document: dict[str, Any]) -> None:
-    ordered = document | {k: dict(sorted(document[k].items())) for k in ("provenance", "models")}
-    write_text(path, json.dumps(ordered, indent=2) + "\n")
+    return tables

@@ -7,14 +7,14 @@ from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
-from pma_gym.documents import read_json
+from pma_gym.documents import read_toml
 from pma_gym.envs import StationInfo
 from pma_gym.tasks import Task
 
-DESIGNS_FILE = Path(__file__).with_name("designs.json")
+DESIGNS_FILE = Path(__file__).with_name("designs.toml")
 """The settings of the controllers here, with where they come from."""
 
-SCHEMA = 1
+SCHEMA = 2
 
 KINDS = {"extension": "displacement", "rotation": "rotation", "contraction": "contraction"}
 """Kind of a task by the quantity that it asks for; an exercise's is its own."""
@@ -50,11 +50,12 @@ def designed(
     kind = task_kind(station)
     if kind not in defaults:
         must_give_a_position(station)
-    loops = read_settings(path, SCHEMA, "design")["controllers"].get(controller, {})
+    loops = kept_settings(path, SCHEMA, "design").get(controller, {})
     known = [name for name, kinds in loops.items() if kind in kinds]
     if not known:
         return defaults[kind]
-    values = loops[nearest_loop(loop_name(station), known)][kind]
+    table = loops[nearest_loop(loop_name(station), known)][kind]
+    values = {name: value for name, value in table.items() if name != "provenance"}
     strange = [name for name in values if name not in defaults[kind]._fields]
     if strange:
         raise ValueError(
@@ -122,23 +123,27 @@ def _dead_time(loop: str) -> float:
     return 1.0 / float(match[1]) + 1e-3 * float(match[2] or 0.0)
 
 
-@cache
 def read_settings(path: Path, schema: int, command: str) -> dict[str, Any]:
-    """A file of settings, read once.
+    """Read a file of settings.
 
     Args:
         path: the file.
         schema: its version.
         command: of the benchmark, that writes such a file.
-
+    Returns:
+        Its tables: by model or controller, loop and kind of task.
     Raises:
         ValueError: the file has another version.
     """
-    document = read_json(path)
-    got = document.get("schema") if isinstance(document, dict) else None
+    document = read_toml(path)
+    got = document.pop("schema", None)
     if got != schema:
         raise ValueError(
             f"{path} must have schema {schema}, got {got!r}; write it anew: "
             f"python -m benchmarks {command}"
         )
     return document
+
+
+kept_settings = cache(read_settings)
+"""As `read_settings`, for a file that stays as it is while this process lasts."""
