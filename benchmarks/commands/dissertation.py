@@ -9,7 +9,6 @@ import typer
 from benchmarks.commands.options import (
     INTERRUPTED,
     RESULTS,
-    Again,
     Jobs,
     OptionalOut,
     Out,
@@ -64,7 +63,6 @@ def measured(
         typer.Option(help="Write the trials to this folder, for pma-gym diagnose, and stop."),
     ] = None,
     recompute: Recompute = False,
-    again: Again = False,
 ) -> None:
     """Diagnose the dissertation's tables I2 and I3; an interrupted run goes on where it stopped."""
     from benchmarks.measured.job import run_measured, write_trials
@@ -77,7 +75,7 @@ def measured(
         print(f"{write_trials(write)} trials in {write}")
         return
     try:
-        run_measured(out, jobs, seed, rounds or MOST_ROUNDS, recompute=recompute or again)
+        run_measured(out, jobs, seed, rounds or MOST_ROUNDS, recompute=recompute)
     except KeyboardInterrupt:
         print(f"Interrupted; run it again, it goes on from {out / 'stages'}", file=sys.stderr)
         raise typer.Exit(INTERRUPTED) from None

@@ -10,7 +10,6 @@ from benchmarks.measured.replays import PHASE_NAMES
 from benchmarks.measured.result import Measured
 from benchmarks.measured.reverse import GAIN, NOTHING, Explanation, alike
 from benchmarks.measured.rounds import Round
-from pma_gym.discovery.result.next_experiment import proposed_excitation
 from pma_gym.terminal import SafeConsole
 
 TARGET_MM = 1.0
@@ -186,7 +185,7 @@ def experiment_text(result: Measured) -> list[str]:
             why = f"tell {' and '.join(names)} apart"
             if len(names) == 1:
                 why = f"see whether {names[0]} is there"
-            words.append(f"Round {number} proposes, to {why}: {proposed_excitation(following)}.")
+            words.append(f"Round {number} proposes, to {why}: {following['excitation']}.")
     for number, each in enumerate(result.proposals, 1):
         shows = ", ".join(map(readable, each.shows))
         words.append(

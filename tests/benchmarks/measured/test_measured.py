@@ -236,11 +236,10 @@ def test_fits_of_other_code_do_not_go_into_a_diagnosis(tmp_path):
 def test_the_command_says_what_is_to_be_made_anew(tmp_path, monkeypatch):
     orders = []
     monkeypatch.setattr(job, "run_measured", lambda *_, recompute: orders.append(recompute))
-    for options in ([], ["--recompute"], ["--again"]):
+    for options in ([], ["--recompute"]):
         done = CliRunner().invoke(app, ["measured", "--out", str(tmp_path), *options])
         assert done.exit_code == 0, done.output
-        assert ("warning: --again is now --recompute" in done.stderr) == ("--again" in options)
-    assert orders == [False, True, True]
+    assert orders == [False, True]
 
 
 def test_a_worked_muscle_has_no_warmth_left():
