@@ -35,8 +35,6 @@ CORE = {
 ENVPOOL_MOST = 16384
 """EnvPool's largest batch here: it holds every environment as an object of its own."""
 
-GPU_COUNTS = (262144, 1048576)
-
 LEAN = {"lean": True, "policy_kwargs": {"optimizer_kwargs": {"fused": True, "eps": 1e-5}}}
 """How the documentation has PPO learn from batches: this package's LeanPPO, and PyTorch's Adam in
 one pass (eps is Stable-Baselines3's own)."""
@@ -239,8 +237,3 @@ def _once() -> Iterator[Row]:
     fits = {"candidates": 20, "trials": 60, "seconds": 10.0}
     title = "20 candidate models fitted to 60 trials of 10 s"
     yield Row("fits/own", title, "own", "fits", fits, unit="times", cores=2)
-    for precision in ("float32", "float64"):
-        for count in GPU_COUNTS:
-            settings = {"name": DISPLACEMENT, "count": count, "precision": precision}
-            key, title = f"gpu/{precision}/{count}", f"pma-gym, CUDA, {precision}"
-            yield Row(key, title, "own", "gpu", settings, step=_OWN)

@@ -38,7 +38,7 @@ def speed_tables(document: Mapping[str, Any]) -> list[SpeedTable]:
         _right_hand_sides(known),
         _arithmetic(known),
         _tolerances(_of(known, "tolerances")),
-        _others(_of(known, "rollouts", "learning", "gpu"), "training", "Training, and the GPU"),
+        _others(_of(known, "rollouts", "learning"), "training", "Training"),
         _times(_of(known, "start"), "start", "The first step"),
         _times(_of(known, "fits"), "fits", "Fits"),
         _ratios(document["ratios"]),

@@ -1,4 +1,4 @@
-"""This package: single environments, batches, its integrator's steps, starts, fits, the GPU.
+"""This package: single environments, batches, its integrator's steps, starts, fits.
 
 What differs between versions of the package is in `hooks`.
 """
@@ -147,5 +147,4 @@ ROWS = {
     "tolerances": tolerances,
     "start": start,
     "fits": hooks.joint_fits,
-    "gpu": hooks.gpu,
 }
