@@ -20,7 +20,6 @@ from benchmarks.commands.options import (
 def register(app: typer.Typer) -> None:
     """Add the commands to the program."""
     app.command(epilog="Example: python -m benchmarks profiles --out profiles.csv")(profiles)
-    app.command(epilog="Example: python -m benchmarks budget --out results/budget")(budget)
     app.command(epilog="Example: python -m benchmarks measured --jobs 2")(measured)
     app.command(
         epilog="Example: python -m benchmarks voltages --controller improved_feedforward "
@@ -35,19 +34,6 @@ def profiles(out: Out) -> None:
     from benchmarks.dissertation.profiles import run_profiles
 
     print(f"{run_profiles(out)} rows in {out}")
-
-
-def budget(
-    out: Annotated[
-        Path, typer.Option(help="Folder of tables (CSV, Markdown) and pictures.")
-    ] = RESULTS / "budget",
-) -> None:
-    """Say why the dissertation's feed-forward misses what it misses, at every pressure."""
-    from benchmarks.budget.job import run_budget
-
-    if out.exists() and not out.is_dir():
-        refuse(ValueError(f"--out {out} is a file; name a folder for the results"))
-    run_budget(out)
 
 
 def measured(
