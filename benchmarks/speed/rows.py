@@ -18,9 +18,6 @@ two processes have one each of."""
 SYNC_COUNTS = (64, 1024)
 """The same for copies in a Python loop, which are no cheaper by the dozen."""
 
-TOLERANCES = (1000, 500, 230, 50, 15)
-"""Tolerances of an internal step, in millionths of the states' scales; 230 is the default."""
-
 EVALUATIONS = 3
 """Evaluations of the right-hand side in an attempt at an internal step: where the step begins, with
 its Jacobian as one more, and at the stage."""
@@ -85,7 +82,7 @@ class Row:
 
 def all_rows() -> list[Row]:
     """Every row, in the order of the tables."""
-    parts = (_single(), _same_plant(), _batches(), _core(), _tolerances(), _learning(), _once())
+    parts = (_single(), _same_plant(), _batches(), _core(), _learning(), _once())
     return [row for part in parts for row in part]
 
 
@@ -200,13 +197,6 @@ def _core() -> Iterator[Row]:
     for operation, title in CORE.items():
         settings = {"operation": operation}
         yield Row(f"core/{operation}", title, "own", "core", settings, unit="operations")
-
-
-def _tolerances() -> Iterator[Row]:
-    for millionths in TOLERANCES:
-        settings = {"model": "station", "millionths": millionths}
-        title, key = "pma-gym's plant", f"tolerances/own/{millionths}"
-        yield Row(key, title, "own", "tolerances", settings, step=_PLANT)
 
 
 def _learning() -> Iterator[Row]:
