@@ -16,15 +16,10 @@ from controllers.oracle import Oracle
 from controllers.pid import PID
 from controllers.policy import Policy, PPOPolicy, ShippedPolicy
 from controllers.policy_with_ilc import PolicyWithILC
-from controllers.registry import CONTROLLERS, RENAMED_MODULES
+from controllers.registry import CONTROLLERS
 from controllers.serres_feedforward import SerresFeedforward
 from controllers.serres_replay import SerresReplay
 from controllers.sliding_mode import SlidingMode
-from pma_gym.renamed_modules import find_renamed_modules
-from pma_gym.renamed_names import renamed_names
-
-find_renamed_modules(RENAMED_MODULES)
-__getattr__ = renamed_names(__name__, {"PractisedPolicy": PolicyWithILC})
 
 __all__ = [
     "ADRC",

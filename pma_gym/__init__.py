@@ -6,7 +6,6 @@ from pma_gym.envs import ENVIRONMENTS, PMAEnv
 from pma_gym.home import give_matplotlib_a_folder
 from pma_gym.plant.model import Model, load_model
 from pma_gym.plant.plant import Plant
-from pma_gym.renamed_modules import find_renamed_modules
 
 __version__ = "0.1.0"
 __all__ = [
@@ -21,4 +20,3 @@ __all__ = [
 ]
 
 give_matplotlib_a_folder()
-find_renamed_modules()

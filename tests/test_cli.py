@@ -73,9 +73,6 @@ def test_commands_are_joined_or_held(run, ramp, tmp_path):
     # Held, the motor has not yet been told to pull when the second row is logged.
     assert loads["foh"] > 200.0
     assert loads["zoh"] == pytest.approx(0.0, abs=1e-6)
-    code, _, err = run("simulate", ramp, *model, "--hold", "zero", "--out", "old.csv")
-    assert code == 0 and "--hold zero is now --interpolation zoh" in err
-    assert (tmp_path / "old.csv").read_bytes() == (tmp_path / "zoh.csv").read_bytes()
 
 
 def test_leaving_the_models_range_is_said(run, tmp_path):
@@ -102,7 +99,7 @@ def test_unknown_columns_are_said(run, tmp_path):
         (RAMP, ["--out", "nowhere/log.csv"], "there is no folder nowhere"),
         (RAMP, ["--out", "log.csv", "--model", "statoin"], "no model 'statoin'.*did you mean"),
         (RAMP, ["--out", "log.csv", "--interpolation", "cubic"], "'cubic' is not one of"),
-        (RAMP, ["--out", "log.csv", "--hold", "cubic"], "'cubic' is not one of"),
+        (RAMP, ["--out", "log.csv", "--interpolation", "cubic"], "'cubic' is not one of"),
         (RAMP, ["--out", "log.csv", "--seed", "-1"], "--seed"),
         (RAMP, [], "Missing option '--out'"),
         ("", ["--out", "log.csv"], "ramp.csv is empty"),

@@ -120,9 +120,6 @@ WORDS = {
 CLEAN = ("benchmarks", "controllers", "docs", "pma_gym", "tests")
 """Folders whose identifiers are held to `WORDS`."""
 
-OLD_NAMES = ("tests/controllers/test_renamed.py", "tests/test_renamed_names.py")
-"""Tests that an earlier name still leads to the present one; they have to say it."""
-
 PHRASES = (
     "remembers itself",
     "at the door",
@@ -141,15 +138,9 @@ EXEMPT = ("docs/notebook",)
 
 
 def identifiers(tree):
-    """Every identifier of a module with its line, but for attributes kept by their old names."""
-    old = {
-        target
-        for node in ast.walk(tree)
-        if isinstance(node, ast.Assign) and ast.unparse(node.value).startswith("renamed_attribute(")
-        for target in node.targets
-    }
+    """Every identifier of a module with its line."""
     for node in ast.walk(tree):
-        if isinstance(node, ast.Name) and node not in old:
+        if isinstance(node, ast.Name):
             yield node.id, node.lineno
         elif isinstance(node, ast.Attribute):
             yield node.attr, node.lineno
@@ -187,7 +178,6 @@ def test_identifiers_are_the_fields_words(folder):
     wrong = [
         f"{path.relative_to(ROOT)} {message}"
         for path in files([folder], {".py"})
-        if path.relative_to(ROOT).as_posix() not in OLD_NAMES
         for message in violations(path.read_text(encoding="utf-8"))
     ]
     assert not wrong, "\n".join(wrong)

@@ -9,7 +9,6 @@ import typer
 from benchmarks.commands.options import (
     INTERRUPTED,
     RESULTS,
-    Again,
     Jobs,
     OptionalOut,
     Out,
@@ -21,7 +20,6 @@ from benchmarks.commands.options import (
 def register(app: typer.Typer) -> None:
     """Add the commands to the program."""
     app.command(epilog="Example: python -m benchmarks profiles --out profiles.csv")(profiles)
-    app.command(epilog="Example: python -m benchmarks budget --out results/budget")(budget)
     app.command(epilog="Example: python -m benchmarks measured --jobs 2")(measured)
     app.command(
         epilog="Example: python -m benchmarks voltages --controller improved_feedforward "
@@ -38,19 +36,6 @@ def profiles(out: Out) -> None:
     print(f"{run_profiles(out)} rows in {out}")
 
 
-def budget(
-    out: Annotated[
-        Path, typer.Option(help="Folder of tables (CSV, Markdown) and pictures.")
-    ] = RESULTS / "budget",
-) -> None:
-    """Say why the dissertation's feed-forward misses what it misses, at every pressure."""
-    from benchmarks.budget.job import run_budget
-
-    if out.exists() and not out.is_dir():
-        refuse(ValueError(f"--out {out} is a file; name a folder for the results"))
-    run_budget(out)
-
-
 def measured(
     out: Annotated[Path, typer.Option(help="Folder of the results.")] = RESULTS / "measured",
     jobs: Jobs = 2,
@@ -64,7 +49,6 @@ def measured(
         typer.Option(help="Write the trials to this folder, for pma-gym diagnose, and stop."),
     ] = None,
     recompute: Recompute = False,
-    again: Again = False,
 ) -> None:
     """Diagnose the dissertation's tables I2 and I3; an interrupted run goes on where it stopped."""
     from benchmarks.measured.job import run_measured, write_trials
@@ -77,7 +61,7 @@ def measured(
         print(f"{write_trials(write)} trials in {write}")
         return
     try:
-        run_measured(out, jobs, seed, rounds or MOST_ROUNDS, recompute=recompute or again)
+        run_measured(out, jobs, seed, rounds or MOST_ROUNDS, recompute=recompute)
     except KeyboardInterrupt:
         print(f"Interrupted; run it again, it goes on from {out / 'stages'}", file=sys.stderr)
         raise typer.Exit(INTERRUPTED) from None

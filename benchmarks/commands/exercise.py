@@ -1,4 +1,4 @@
-"""The commands about the exercise device: `exercise`, `safety` and `lag`."""
+"""The commands about the exercise device: `exercise` and `safety`."""
 
 from pathlib import Path
 from typing import Annotated
@@ -21,7 +21,6 @@ def register(app: typer.Typer) -> None:
         epilog="Example: python -m benchmarks exercise --muscles 2 --diameter 20 --moment 10"
     )(exercise)
     app.command(epilog="Example: python -m benchmarks safety --episodes 100")(safety)
-    app.command(epilog="Example: python -m benchmarks lag --operators 1")(lag)
 
 
 def exercise(
@@ -85,29 +84,4 @@ def safety(
             raise SafetyError(f"--out {out} is a file; name a folder for the results")
         run_safety(episodes, bare, seed, out, SafeConsole(), chosen_executor(executor, jobs))
     except SafetyError as error:
-        refuse(error)
-
-
-def lag(
-    task: Annotated[str, typer.Argument(help="Name of an exercise.")] = "isokinetic_exercise",
-    operators: Annotated[
-        int, typer.Option(help="Whose course is searched through; 0: the linear bounds alone.")
-    ] = 8,
-    pressures: Annotated[
-        str, typer.Option(help="That episodes begin at (kPa), by commas; by the seed if empty.")
-    ] = "",
-    safety: Annotated[bool, typer.Option(help="Also behind the safety layer.")] = False,
-    out: Annotated[Path, typer.Option(help="Folder of the tables.")] = RESULTS / "lag",
-) -> None:
-    """Bound what the regulator's lag makes impossible in an exercise; a minute an operator."""
-    from benchmarks.exercise.lag.job import LagError, run_lag
-    from pma_gym.numerals import parse_numbers
-    from pma_gym.terminal import SafeConsole
-
-    try:
-        listed = parse_numbers(pressures)
-        if listed is None:
-            raise LagError(f"--pressures must be numbers in kPa, got {pressures!r}")
-        run_lag(task, operators, listed, safety, out, SafeConsole())
-    except ValueError as error:
         refuse(error)

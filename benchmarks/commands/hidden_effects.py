@@ -8,7 +8,6 @@ import typer
 from benchmarks.commands.options import (
     LOCAL,
     RESULTS,
-    Again,
     ExecutorOption,
     Jobs,
     Recompute,
@@ -55,7 +54,6 @@ def hidden_effects(
     ] = 2,
     keep: Annotated[bool, typer.Option("--keep", help="Keep the trials in FOLDER/data.")] = False,
     recompute: Recompute = False,
-    again: Again = False,
 ) -> None:
     """Hide effects in trials, diagnose them, count what was named right; goes on after Ctrl-C."""
     from benchmarks.hidden_effects.job import JobError, Order, ordered, run_hidden_effects
@@ -67,7 +65,7 @@ def hidden_effects(
         for each in blocks:
             usual = (out or RESULTS / "hidden_effects") / f"{each.name}-{seed}"
             folder = usual if out is None or len(blocks) > 1 else out
-            orders.append(Order(each, n, seed, folder, places, keep, recompute or again))
+            orders.append(Order(each, n, seed, folder, places, keep, recompute))
         code = run_hidden_effects(orders, json_file)
     except JobError as error:
         refuse(error)

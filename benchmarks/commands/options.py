@@ -30,13 +30,6 @@ def chosen_executor(name: ExecutorName, jobs: int) -> Executor:
         refuse(error)
 
 
-def _old_name(again: bool) -> bool:
-    """Warn of an option that has another name now."""
-    if again:
-        print("warning: --again is now --recompute; use that name", file=sys.stderr)
-    return again
-
-
 def require_writable(path: Path | None, option: str) -> None:
     """Refuse a file that cannot be written before anything is computed for it.
 
@@ -74,4 +67,3 @@ ExecutorOption = Annotated[
 ]
 LOCAL = ExecutorName.LOCAL
 Recompute = Annotated[bool, typer.Option("--recompute", help="Compute anew what other code made.")]
-Again = Annotated[bool, typer.Option("--again", hidden=True, callback=_old_name)]

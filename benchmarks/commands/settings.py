@@ -7,7 +7,6 @@ import typer
 
 from benchmarks.commands.options import (
     INTERRUPTED,
-    Again,
     Jobs,
     OptionalOut,
     listed,
@@ -63,7 +62,6 @@ def design(
             "--recompute", help="Also what the file has already; else only what is missing."
         ),
     ] = False,
-    again: Again = False,
     only: Annotated[
         str, typer.Option(help="Designs by suite and kind of task, such as 'hard/*'.")
     ] = "*",
@@ -73,9 +71,7 @@ def design(
     from controllers.design.designs import DESIGNS_FILE
 
     try:
-        complete = run_design(
-            listed(controllers), out or DESIGNS_FILE, seed, jobs, recompute or again, only
-        )
+        complete = run_design(listed(controllers), out or DESIGNS_FILE, seed, jobs, recompute, only)
     except ValueError as error:
         refuse(error)
     raise typer.Exit(0 if complete else INTERRUPTED)

@@ -1,24 +1,16 @@
-"""The commands about the simulator: `accuracy` and `speed`."""
+"""The command about the simulator: `speed`."""
 
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from benchmarks.commands.options import OptionalOut, refuse
+from benchmarks.commands.options import refuse
 
 
 def register(app: typer.Typer) -> None:
-    """Add the commands to the program."""
-    app.command(epilog="Example: python -m benchmarks accuracy --out accuracy.txt")(accuracy)
+    """Add the command to the program."""
     app.command(epilog="Example: python -m benchmarks speed --quick --only single")(speed)
-
-
-def accuracy(out: OptionalOut = None) -> None:
-    """Measure the integrator's accuracy; exit code 1 if the default step misses a limit."""
-    from benchmarks.accuracy.job import run_accuracy
-
-    raise typer.Exit(0 if run_accuracy(out=out) else 1)
 
 
 def speed(

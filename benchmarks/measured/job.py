@@ -17,7 +17,6 @@ from benchmarks.files import write_text
 from benchmarks.measured.detectability import undecidable
 from benchmarks.measured.pages import measured_page
 from benchmarks.measured.result import Measured
-from benchmarks.measured.reverse import Explanation, searched
 from benchmarks.measured.rounds import MOST_ROUNDS, rounds
 from benchmarks.measured.smooth import smooth_errors
 from benchmarks.measured.stages import Stages
@@ -27,8 +26,6 @@ from benchmarks.measured.trials import measured_dataset
 from benchmarks.measured.triangles import held_against
 from pma_gym.data.datasets.dataset import Dataset
 from pma_gym.data.files.trial_files import encode_trial
-from pma_gym.discovery.fitting.journal import digest
-from pma_gym.document_shape import ListOf, check_shape, shape_of
 from pma_gym.plant.model import load_model
 from pma_gym.terminal import SafeConsole
 
@@ -37,9 +34,6 @@ GIVEN = "serres2008"
 
 STATION = "station"
 """The model that `python -m benchmarks identify` made of the same tables."""
-
-REVERSE_ROUNDS = 2
-"""Most explanations that are added to it, one after the other."""
 
 DIAGNOSED_KPA = (150.0, 250.0, 300.0, 400.0, 500.0, 575.0)
 """Pressures that the diagnosis sees. Effects are chosen, and parameters fitted, without the other
@@ -131,7 +125,6 @@ def _computed(stages: Stages, jobs: int, seed: int, most: int, tell: Tell) -> Me
     final = load_model(stages.folder / f"step_{len(stepped) - 1}.toml")
     questions = partial(tell, "what is not detectable")
     not_detectable, proposals = undecidable(final, few, jobs, seed, questions)
-    reverse = _reverse(stages, partial(tell, "the reverse"))
     models = {GIVEN: given, STATION: load_model(STATION), "amended": final}
     return Measured(
         diagnoses,
@@ -141,30 +134,10 @@ def _computed(stages: Stages, jobs: int, seed: int, most: int, tell: Tell) -> Me
         smooth_errors(*judged),
         not_detectable,
         proposals,
-        reverse,
         held_against(models, given),
         0.0,
         _settings(seed, stages),
     )
-
-
-def _reverse(stages: Stages, progress: Callable[[int, int], None]) -> list[list[Explanation]]:
-    """What explains the misfit of the identified station, from what is kept where it is there."""
-    model = load_model(STATION)
-    asked = digest([], model, "reverse")
-    kept = stages.kept("reverse", asked, _explanations)
-    if kept is not None:
-        return kept
-    by_round = searched(model, REVERSE_ROUNDS, progress)
-    stages.keep(
-        "reverse", asked, {"explanations": [[asdict(each) for each in every] for every in by_round]}
-    )
-    return by_round
-
-
-def _explanations(explanations: list[list[dict[str, Any]]]) -> list[list[Explanation]]:
-    check_shape(explanations, ListOf(ListOf(shape_of(Explanation, finite=False))), "explanations")
-    return [[Explanation(**each) for each in every] for every in explanations]
 
 
 def diagnosed(

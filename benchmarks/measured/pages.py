@@ -9,7 +9,6 @@ from benchmarks.measured.tables import (
     HELD_HEADER,
     NOT_DETECTABLE_HEADER,
     REPLAY_HEADER,
-    REVERSE_HEADER,
     TARGET_MM,
     error_rows,
     experiment_text,
@@ -17,8 +16,6 @@ from benchmarks.measured.tables import (
     not_detectable_rows,
     readable,
     replay_rows,
-    reverse_rows,
-    reverse_text,
     round_rows,
     verdict_text,
 )
@@ -85,25 +82,6 @@ def _blocks(result: Measured) -> list[Block]:
         )
     )
     blocks += [Paragraph(words) for words in experiment_text(result)]
-    blocks += _reverse_blocks(result)
-    return blocks
-
-
-def _reverse_blocks(result: Measured) -> list[Block]:
-    """What the identified station misses."""
-    blocks: list[Block] = [
-        Heading("The reverse: what the identified station misses in tables 21-30"),
-        Paragraph(
-            "Each measured phase is known by slope, intercept and the mean square about its line. "
-            "Every effect that `station` lacks, and the numbers that it has, are fitted to what "
-            "its simulation misses of them, with each pressure left out in turn (one step of the "
-            "fit, simulated)."
-        ),
-        *(Paragraph(words) for words in reverse_text(result)),
-    ]
-    for number, explanations in enumerate(result.reverse, 1):
-        title = f"Explanations, {number}: rms (mm at the muscle)"
-        blocks.append(TextTable(title, REVERSE_HEADER, reverse_rows(explanations), words=2))
     blocks += [
         Heading("Validation under triangular pressure (figures 28 and 29)"),
         Paragraph(

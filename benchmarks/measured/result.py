@@ -4,7 +4,6 @@ from dataclasses import dataclass
 from typing import Any
 
 from benchmarks.measured.detectability import Proposal, Undecidable
-from benchmarks.measured.reverse import Explanation
 from benchmarks.measured.rounds import Round
 from benchmarks.measured.steps import Step
 from benchmarks.measured.triangles import Held
@@ -22,7 +21,6 @@ class Measured:
         smooth: rms errors at unseen pressures of a smooth function of the commands, by figure.
         not_detectable: effects that I2 and I3 cannot tell beside the amended model.
         proposals: experiments that would show them.
-        reverse: what explains the misfit of the identified station in tables 21-30, round by round.
         held: models against the validation under triangular pressure.
         seconds: how long this run took (s), without stages kept from an earlier one.
         settings: what was diagnosed, and how many stages which code made.
@@ -35,7 +33,6 @@ class Measured:
     smooth: dict[str, float]
     not_detectable: list[Undecidable]
     proposals: list[Proposal]
-    reverse: list[list[Explanation]]
     held: list[Held]
     seconds: float
     settings: dict[str, Any]

@@ -30,9 +30,6 @@ ELSEWHERE = (
 
 T = TypeVar("T")
 
-_RENAMED = {"found": "explanations", "blind": "not_detectable"}
-"""Names in stages of older versions."""
-
 
 @cache
 def fingerprint() -> str:
@@ -77,7 +74,6 @@ class Stages:
         path = self._path(name)
         entry = self._entry(path)
         code = entry.pop("code", "")
-        entry = {_RENAMED.get(name, name): value for name, value in entry.items()}
         if entry.pop("asked", None) != asked or (code != self.code and self.recompute):
             return None
         try:

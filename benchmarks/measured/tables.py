@@ -8,9 +8,7 @@ from rich.table import Table
 
 from benchmarks.measured.replays import PHASE_NAMES
 from benchmarks.measured.result import Measured
-from benchmarks.measured.reverse import GAIN, NOTHING, Explanation, alike
 from benchmarks.measured.rounds import Round
-from pma_gym.discovery.result.next_experiment import proposed_excitation
 from pma_gym.terminal import SafeConsole
 
 TARGET_MM = 1.0
@@ -85,74 +83,6 @@ def replay_rows(result: Measured, phase: str) -> Rows:
     ]
 
 
-def reverse_rows(explanations: Sequence[Explanation]) -> Rows:
-    """Explanations of what the station misses in tables 21-30, the best first."""
-    return [
-        (
-            readable(each.name),
-            ", ".join(f"{value:.4g}" for value in each.values.values()),
-            f"{each.fitted_mm:.2f}",
-            f"{each.left_out_mm:.2f}",
-            f"{each.displacement_mm:.2f}",
-            f"{each.rotation_mm:.2f}",
-        )
-        for each in explanations[:MOST_SHOWN]
-    ] + [
-        (each.name, "", f"{each.fitted_mm:.2f}", f"{each.left_out_mm:.2f}",
-         f"{each.displacement_mm:.2f}", f"{each.rotation_mm:.2f}")
-        for each in explanations[MOST_SHOWN:]
-        if each.name == NOTHING
-    ]  # fmt: skip
-
-
-REVERSE_HEADER = (
-    *("explanation", "size", "all pressures"),
-    *("left-out pressures", "in displacement", "in rotation"),
-)
-MOST_SHOWN = 8
-"""Explanations that are listed."""
-
-
-def reverse_text(result: Measured) -> Iterator[str]:
-    """Describe explanations of the misfit, and those not distinguishable from them."""
-    for explanations in result.reverse:
-        plain = next(each for each in explanations if each.name == NOTHING)
-        yield from _hypothesis_text(explanations, plain)
-        counted = [each for each in explanations if not each.hypothesis]
-        best, others = counted[0], [each for each in alike(counted) if each is not counted[0]]
-        if best is plain or best.left_out_mm > GAIN * plain.left_out_mm:
-            yield (
-                f"Nothing further explains a tenth of the {plain.left_out_mm:.2f} mm that are left "
-                "at pressures left out."
-            )
-            continue
-        others_as_good = ", ".join(_costs(each, plain) for each in others)
-        yield (
-            f"Of {plain.left_out_mm:.2f} mm, {_costs(best, plain)} leaves {best.left_out_mm:.2f} "
-            "mm at pressures left out, the least."
-            + (f" As good within 15 %: {others_as_good}." if others_as_good else "")
-        )
-
-
-def _hypothesis_text(explanations: Sequence[Explanation], plain: Explanation) -> Iterator[str]:
-    """Hypotheses made after the tables were seen: listed, and never counted."""
-    for each in explanations:
-        if each.hypothesis:
-            size = ", ".join(f"{name} {value:.3g}" for name, value in each.values.items())
-            yield (
-                f"Hypothesis, thought of when these tables had been seen: {each.name} ({size}) "
-                f"leaves {each.left_out_mm:.2f} of {plain.left_out_mm:.2f} mm at pressures left "
-                "out. These tables cannot decide it: undecidable until the potentiometer is turned "
-                "once by hand beside a scale."
-            )
-
-
-def _costs(each: Explanation, plain: Explanation) -> str:
-    """Its name, and whether it is bought with an error elsewhere."""
-    spoils = each.displacement_mm > 1.1 * plain.displacement_mm
-    return readable(each.name) + (" (but worse in displacement)" if spoils else "")
-
-
 def held_rows(result: Measured) -> Rows:
     """Models against the validation under triangular pressure."""
     return [
@@ -186,7 +116,7 @@ def experiment_text(result: Measured) -> list[str]:
             why = f"tell {' and '.join(names)} apart"
             if len(names) == 1:
                 why = f"see whether {names[0]} is there"
-            words.append(f"Round {number} proposes, to {why}: {proposed_excitation(following)}.")
+            words.append(f"Round {number} proposes, to {why}: {following['excitation']}.")
     for number, each in enumerate(result.proposals, 1):
         shows = ", ".join(map(readable, each.shows))
         words.append(
@@ -228,13 +158,6 @@ def print_measured(result: Measured, console: Console) -> None:
     for phase, label in PHASE_NAMES.items():
         title = f"Replay of the printed voltages, {label}: mean absolute error"
         _print(console, title, REPLAY_HEADER, replay_rows(result, phase))
-    for number, explanations in enumerate(result.reverse, 1):
-        title = (
-            f"The reverse, {number}: misfit of `station` in tables 21-30, rms (mm at the muscle)"
-        )
-        _print(console, title, REVERSE_HEADER, reverse_rows(explanations))
-    for line in reverse_text(result):
-        console.print(line, highlight=False)
     _print(console, "Triangular pressure, figures 28 and 29", HELD_HEADER, held_rows(result))
     _print(
         console, "What I2 and I3 cannot tell", NOT_DETECTABLE_HEADER, not_detectable_rows(result)

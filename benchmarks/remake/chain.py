@@ -96,7 +96,6 @@ def chain(jobs: int = 2) -> list[Step]:
             scored,
             1.5,
         ),
-        Step("budget", "the error budget", ((*own, "budget"),), scored, 0.2),
         Step("exercise", "the exercise device", exercise, scored, 0.2),
         Step("measured", "diagnosis of I2 and I3", ((*own, "measured", *workers),), (MODEL,), 4.0),
         Step(

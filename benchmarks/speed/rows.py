@@ -18,9 +18,6 @@ two processes have one each of."""
 SYNC_COUNTS = (64, 1024)
 """The same for copies in a Python loop, which are no cheaper by the dozen."""
 
-TOLERANCES = (1000, 500, 230, 50, 15)
-"""Tolerances of an internal step, in millionths of the states' scales; 230 is the default."""
-
 EVALUATIONS = 3
 """Evaluations of the right-hand side in an attempt at an internal step: where the step begins, with
 its Jacobian as one more, and at the stage."""
@@ -34,8 +31,6 @@ CORE = {
 
 ENVPOOL_MOST = 16384
 """EnvPool's largest batch here: it holds every environment as an object of its own."""
-
-GPU_COUNTS = (262144, 1048576)
 
 LEAN = {"lean": True, "policy_kwargs": {"optimizer_kwargs": {"fused": True, "eps": 1e-5}}}
 """How the documentation has PPO learn from batches: this package's LeanPPO, and PyTorch's Adam in
@@ -87,7 +82,7 @@ class Row:
 
 def all_rows() -> list[Row]:
     """Every row, in the order of the tables."""
-    parts = (_single(), _same_plant(), _batches(), _core(), _tolerances(), _learning(), _once())
+    parts = (_single(), _same_plant(), _batches(), _core(), _learning(), _once())
     return [row for part in parts for row in part]
 
 
@@ -204,13 +199,6 @@ def _core() -> Iterator[Row]:
         yield Row(f"core/{operation}", title, "own", "core", settings, unit="operations")
 
 
-def _tolerances() -> Iterator[Row]:
-    for millionths in TOLERANCES:
-        settings = {"model": "station", "millionths": millionths}
-        title, key = "pma-gym's plant", f"tolerances/own/{millionths}"
-        yield Row(key, title, "own", "tolerances", settings, step=_PLANT)
-
-
 def _learning() -> Iterator[Row]:
     pendulum = {"name": "Pendulum-v1", "count": 8, "kind": "copies"}
     copies = {"name": DISPLACEMENT, "count": 8, "kind": "copies"}
@@ -239,8 +227,3 @@ def _once() -> Iterator[Row]:
     fits = {"candidates": 20, "trials": 60, "seconds": 10.0}
     title = "20 candidate models fitted to 60 trials of 10 s"
     yield Row("fits/own", title, "own", "fits", fits, unit="times", cores=2)
-    for precision in ("float32", "float64"):
-        for count in GPU_COUNTS:
-            settings = {"name": DISPLACEMENT, "count": count, "precision": precision}
-            key, title = f"gpu/{precision}/{count}", f"pma-gym, CUDA, {precision}"
-            yield Row(key, title, "own", "gpu", settings, step=_OWN)

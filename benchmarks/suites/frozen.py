@@ -17,7 +17,6 @@ from benchmarks.suites.target import parse_target
 from pma_gym.document_shape import ListOf, Maybe, Real, Whole, check_shape
 from pma_gym.documents import DocumentError, is_file, read_toml
 from pma_gym.engine.options import parse_options
-from pma_gym.engine.renamed_options import first_names, renamed_options
 from pma_gym.limits import LimitError
 from pma_gym.paths import is_path, missing_file
 from pma_gym.tasks import EVERY_TASK, named_task
@@ -147,7 +146,7 @@ def parse_suite(source: str, document: Mapping[str, Any]) -> FrozenSuite:
             f"a suite must have at most {MOST_EPISODES} episodes, got {episodes}; lower "
             "stations.count, per_station or repeats"
         )
-    environment = renamed_options(document["environment"], f"suite {document['name']}")
+    environment = document["environment"]
     parse_options(environment)
     common: dict[str, Any] = {
         "source": source,
@@ -162,7 +161,7 @@ def parse_suite(source: str, document: Mapping[str, Any]) -> FrozenSuite:
         "episode_plans": episode_plans,
         "entries": tuple(_entry(entry) for entry in document["controllers"]),
         "targets": tuple(parse_target(given) for given in document.get("targets", ())),
-        "digest": _digest({**document, "environment": environment}),
+        "digest": _digest(document),
         "only_by_name": document.get("only_by_name", False),
     }
     if "reproduction" in document:
@@ -231,9 +230,8 @@ def _entry(given: Mapping[str, Any]) -> Entry:
 
 
 def _digest(document: Mapping[str, Any]) -> str:
-    """Digest of all that moves a figure, by the names that it was first written with."""
+    """Digest of all that moves a figure."""
     frozen = {key: value for key, value in document.items() if key not in UNFROZEN}
-    frozen["environment"] = first_names(document["environment"])
     if "of" in document.get("stations", {}):
         frozen["of"] = frozen_suite(document["stations"]["of"]).digest
     return hashlib.sha256(json.dumps(frozen, sort_keys=True).encode()).hexdigest()[:16]

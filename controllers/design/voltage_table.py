@@ -4,10 +4,8 @@ import numpy as np
 
 from pma_gym.envs import Measurement
 from pma_gym.integrator.equations import Interpolation, check_interpolation
-from pma_gym.renamed_keywords import old_keywords
 
 
-@old_keywords({"hold": "interpolation"}, {"hold": {"linear": "foh", "zero": "zoh"}})
 class VoltageTable:
     """Motor voltage by time, between samples 0.2 s apart; what both controllers here replay.
 

@@ -4,8 +4,6 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
-from pma_gym.renamed_names import renamed_names
-
 FormKind = Literal["direct", "increment", "residual"]
 FORM_KINDS: tuple[FormKind, ...] = ("direct", "increment", "residual")
 
@@ -78,6 +76,3 @@ class ActionMapping:
         if self.kind == "direct":
             return MIDDLE_V + MIDDLE_V * action
         return (before if self.kind == "increment" else base) + self.authority_v * action
-
-
-__getattr__ = renamed_names(__name__, {"Form": ActionMapping})

@@ -20,7 +20,6 @@ from controllers.policies.observation_spec import (
 from controllers.policies.scales import scales_of
 from controllers.registry import CONTROLLERS
 from pma_gym.envs import Measurement, StationInfo
-from pma_gym.renamed_names import renamed_names
 
 DIVERGED = (
     "the policy's action must be a finite number,{} got {}; its weights have diverged: train it "
@@ -144,6 +143,3 @@ def base_of(form: ActionMapping) -> Controller:
     if form.base is None or form.base not in CONTROLLERS:
         raise ValueError(f"form base must be one of {', '.join(CONTROLLERS)}, got {form.base!r}")
     return CONTROLLERS[form.base]()
-
-
-__getattr__ = renamed_names(__name__, {"Pilot": PolicyAdapter})

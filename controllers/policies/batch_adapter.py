@@ -17,7 +17,6 @@ from controllers.policies.observation_spec import (
 )
 from controllers.policies.scales import scales_of
 from pma_gym.envs import Measurement, StationInfo
-from pma_gym.renamed_names import renamed_names
 
 
 class BatchPolicyAdapter:
@@ -143,6 +142,3 @@ class BatchPolicyAdapter:
         self._volts[:, 0] = np.clip(wanted, 0.0, HIGHEST_V)
         self.steps += 1
         return self._volts[:, 0].copy()
-
-
-__getattr__ = renamed_names(__name__, {"Pilots": BatchPolicyAdapter})

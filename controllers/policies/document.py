@@ -10,7 +10,6 @@ from controllers.policies.action_mapping import ActionMapping
 from controllers.policies.network import ACTIVATIONS, OUTPUTS
 from controllers.policies.observation_spec import ObservationSpec
 from pma_gym.documents import parse_json
-from pma_gym.engine.renamed_options import renamed_options
 
 SCHEMA = 1
 
@@ -150,13 +149,8 @@ def tensor_shapes(sizes: list[int], scaled: bool) -> dict[str, list[int]]:
 
 def _check_environment(environment: dict[str, Any]) -> None:
     _check(_is_text(environment["id"]), "environment.id", "a text", environment["id"])
-    given = environment["kwargs"]
-    _check(isinstance(given, dict), "environment.kwargs", "an object", given)
-    try:
-        kwargs = renamed_options(given, "environment.kwargs")
-    except TypeError as error:
-        raise PolicyError(str(error)) from None
-    environment["kwargs"] = kwargs
+    kwargs = environment["kwargs"]
+    _check(isinstance(kwargs, dict), "environment.kwargs", "an object", kwargs)
     missing = [key for key in LOOP if key not in kwargs]
     if missing:
         raise PolicyError(f"environment.kwargs lacks {', '.join(missing)}")

@@ -12,7 +12,6 @@ from controllers.policies.scales import FINE_SHARE, Scales, delayed_rows, share_
 from pma_gym.engine.observation import BOUND, ObservationTable
 from pma_gym.engine.options import Options
 from pma_gym.envs import Measurement, StationInfo
-from pma_gym.renamed_names import renamed_names
 
 ViewKind = Literal["tracking", "environment"]
 VIEW_KINDS: tuple[ViewKind, ...] = ("tracking", "environment")
@@ -161,6 +160,3 @@ def environment_entries(
         return getattr(readings[min(steps - delay, len(readings) - 1)], part)
 
     return table.entries(reading, reference, [action])
-
-
-__getattr__ = renamed_names(__name__, {"View": ObservationSpec})

@@ -50,21 +50,6 @@ class Interpolate(StrEnum):
     ZOH = "zoh"
 
 
-_OLD_INTERPOLATIONS = {"linear": Interpolate.FOH, "zero": Interpolate.ZOH}
-"""Values of `--hold`, the old name of `--interpolation`."""
-
-
-def _old_hold(hold: str | None) -> str | None:
-    """Warn of an option that has another name now."""
-    if hold is None:
-        return None
-    if hold not in _OLD_INTERPOLATIONS:
-        raise typer.BadParameter(f"{hold!r} is not one of 'linear', 'zero'; take --interpolation")
-    new = f"--interpolation {_OLD_INTERPOLATIONS[hold]}"
-    print(f"warning: --hold {hold} is now {new}; use that name", file=sys.stderr)
-    return hold
-
-
 @app.callback()
 def program(
     version: Annotated[
@@ -93,7 +78,6 @@ def simulate(
         Interpolate,
         typer.Option(help="Join rows linearly (foh), or hold each until the next (zoh)."),
     ] = Interpolate.FOH,
-    hold: Annotated[str | None, typer.Option(hidden=True, callback=_old_hold)] = None,
 ) -> None:
     """Run a command file through a model and write the trial as the station's log would be."""
     check_writable(out)
@@ -102,8 +86,7 @@ def simulate(
     plant = Plant(load_model(model))
     given = read(commands)
     try:
-        how = interpolation if hold is None else _OLD_INTERPOLATIONS[hold]
-        trial = plant.simulate(given, noise, seed, interpolation=how.value)
+        trial = plant.simulate(given, noise, seed, interpolation=interpolation.value)
     except SampleError as error:
         raise TrialError(error.at(place_in_file(commands, error.sample))) from error
     except ValueError as error:

@@ -1,9 +1,9 @@
-"""Compilation of laws to machine code: traced once, compiled for processors and GPUs.
+"""Compilation of laws to machine code: traced once, compiled for the processor.
 
 `graph` and `trace` call laws on values instead of numbers and remember the arithmetic; `derivative`
 differentiates it; `text` writes it as Python; `llvm` and `control` as LLVM instructions, scalar or
-in SIMD lanes; `native` compiles those for the processor and keeps the result, `ptx` for a GPU;
-`random` has random numbers that can be traced. A law, in lanes of eight:
+in SIMD lanes; `native` compiles those for the processor and keeps the result; `random` has random
+numbers that can be traced. A law, in lanes of eight:
 
     >>> import ctypes
     >>> import numpy as np

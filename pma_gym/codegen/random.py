@@ -1,7 +1,7 @@
 """Random numbers that depend on nothing but a counter and a key.
 
-The same numbers come out of Python, of every width of compiled code and of a GPU, in whatever order
-lanes are computed. Written in operators and `generic`, so they take traced integers, plain ones and
+The same numbers come out of Python and of every width of compiled code, in whatever order lanes
+are computed. Written in operators and `generic`, so they take traced integers, plain ones and
 arrays of unsigned 64-bit integers; words have 32 bits and stand in 64.
 """
 

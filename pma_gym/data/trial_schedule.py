@@ -12,7 +12,6 @@ from numpy.typing import ArrayLike, NDArray
 from pma_gym.data.signals import SIGNALS, Signal
 from pma_gym.metrics import PHASE_DURATION, PHASE_SAMPLES, SAMPLE_RATE_HZ
 from pma_gym.pickling import Packed, packed
-from pma_gym.renamed_names import renamed_names
 from pma_gym.units import SI_FACTORS
 
 _MM = SI_FACTORS["mm"]
@@ -222,5 +221,3 @@ tables 24-30)."""
 
 SCHEDULES = {schedule.name: schedule for schedule in (DISPLACEMENT, ROTATION)}
 """The dissertation's two by name."""
-
-__getattr__ = renamed_names(__name__, {"Protocol": TrialSchedule, "PROTOCOLS": "SCHEDULES"})

@@ -19,7 +19,6 @@ from pma_gym.discovery.result.next_experiment import NextExperiment
 from pma_gym.discovery.result.noise import Floor, Judgement, Nuisance
 from pma_gym.discovery.result.notebook_view import notebook_view
 from pma_gym.plant.model import Model
-from pma_gym.renamed_names import renamed_attribute
 
 __all__ = [
     "Approximate", "Candidate", "Diagnosis", "Estimate", "Floor", "Gap", "Judgement", "Map",
@@ -108,8 +107,6 @@ class Diagnosis:
     def unfitted(self) -> tuple[str, ...]:
         """Candidates that could not be fitted, and may carry what is missing."""
         return tuple(each.name for each in self.candidates if each.why == UNFITTED)
-
-    blind = renamed_attribute("blind", "not_detectable")
 
     def document(self) -> dict[str, Any]:
         """The content of `diagnosis.json`."""

@@ -2,7 +2,7 @@
 
 Every law uses + - * / `abs` `**0.5`, `floor` of `pma_gym.codegen.generic` and the functions below,
 nothing else. Each is one scalar expression without side effects, so that the same text runs as
-plain Python, compiled for one trial, in SIMD lanes and on a GPU with the same bits. `as_numpy`
+plain Python, compiled for one trial and in SIMD lanes with the same bits. `as_numpy`
 rebinds `where` for NumPy arrays.
 """
 

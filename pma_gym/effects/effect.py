@@ -8,7 +8,6 @@ from itertools import pairwise
 from types import MappingProxyType
 from typing import Any, get_type_hints
 
-from pma_gym.renamed_keywords import old_keywords
 from pma_gym.units import Quantity
 
 Value = float | tuple[float, ...]
@@ -17,14 +16,6 @@ Parameters = Any
 """An effect's parameters in SI, a NamedTuple that each effect's file defines."""
 
 
-@old_keywords(
-    {
-        "path": "rate_independent_law",
-        "path_bend": "path_breakpoint",
-        "switch": "event",
-        "bend": "breakpoint",
-    }
-)
 @dataclass(frozen=True)
 class Effect:
     """One phenomenon that a plant can have.

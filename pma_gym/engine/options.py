@@ -22,7 +22,6 @@ from pma_gym.engine.option_checks import (
     unknown_name,
 )
 from pma_gym.engine.plain_values import plain_options
-from pma_gym.engine.renamed_options import renamed_options
 from pma_gym.engine.reward_function import RewardFunction, check_reward_function
 from pma_gym.pickling import Packed, packed
 from pma_gym.plant.compiled_model import DEFAULT_TOLERANCE, check_tolerance
@@ -208,7 +207,6 @@ def parse_options(
         TypeError: an unknown keyword, with the nearest known one.
         ValueError: a value that is out of range or of the wrong kind.
     """
-    given = renamed_options(given, caller, stacklevel=3)
     check_keywords(caller, given, [field.name for field in fields(Options)], others)
     if isinstance(given.get("max_episode_steps"), DefaultSteps):
         # Of the registered options, not of these: nobody asked for it.

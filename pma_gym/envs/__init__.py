@@ -10,7 +10,6 @@ from pma_gym.envs.specs import DefaultSteps, single_wrappers
 from pma_gym.envs.state import EnvState
 from pma_gym.envs.station_info import Measurement, Reference, StationInfo
 from pma_gym.envs.vector import PMAVectorEnv
-from pma_gym.renamed_names import renamed_names
 from pma_gym.tasks import EVERY_TASK
 
 ENVIRONMENTS = {
@@ -51,5 +50,3 @@ __all__ = [
     "StateError",
     "StationInfo",
 ]
-
-__getattr__ = renamed_names(__name__, {"Station": StationInfo, "Reading": Measurement})

@@ -16,7 +16,6 @@ from pma_gym.envs.station_info import Measurement, Reference, StationInfo, detac
 from pma_gym.envs.summary import episode_summary
 from pma_gym.plant.condition import Condition
 from pma_gym.plant.plant import Plant
-from pma_gym.renamed_names import renamed_attribute
 from pma_gym.tasks import Events, Operator, Task
 
 NOT_BEGUN = "no episode has begun"
@@ -92,9 +91,6 @@ class Episode:
         """The measurement that the agent receives, `observation_delay_s` old."""
         taken = max(self._count - self.options.observation_delay, 0) * self.options.period
         return Measurement(taken, *self._row[self._measured].tolist())
-
-    reading = renamed_attribute("reading", "measurement")
-    human = renamed_attribute("human", "operator")
 
     @property
     def truth(self) -> dict[str, float]:

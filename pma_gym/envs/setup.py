@@ -2,7 +2,6 @@
 
 import hashlib
 import re
-import warnings
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
 from typing import Any
@@ -12,9 +11,7 @@ import numpy as np
 from pma_gym.effects.user_effects import source_of
 from pma_gym.engine.engine import Engine
 from pma_gym.engine.options import Options
-from pma_gym.engine.renamed_options import RENAMED_OPTIONS, RENAMED_VALUES
 from pma_gym.plant.model import Model
-from pma_gym.tasks import Task
 
 Setup = tuple[tuple[str, str], ...]
 """Names and values of the task, the options and the model's parameters."""
@@ -25,23 +22,6 @@ SINGLE = "a PMAEnv"
 FEW = 4
 """Largest number of differences in a message."""
 
-_RENAMED = {
-    "Human": "Operator",
-    "Plan": "MomentProfile",
-    "Guard": "SafetyFilter",
-    "guard": "safety_filter",
-}
-"""Earlier names of classes and fields in saved states, with the present names."""
-
-_RENAMED_NUMBERS = {
-    "memory_operator": "memory_hand_push",
-    "human": "operator",
-    "mind": "operator_state",
-    "told": "nominal",
-    "guard": "safety",
-}
-"""Earlier prefixes of names of numbers in saved states, with the present prefixes."""
-
 _OPTIONS = {
     # The nominal model stands elsewhere, number by number, wherever it was read from.
     field.name: field.default
@@ -50,8 +30,6 @@ _OPTIONS = {
 }
 """Options in a setup, with their defaults."""
 
-_OLD_NAME = re.compile(rf"\b({'|'.join(_RENAMED)})(?=[{{:])")
-_OLD_NUMBER = re.compile(rf"\b({'|'.join(_RENAMED_NUMBERS)})(?=_| |$)")
 _ADDRESS = re.compile(r" at 0x[0-9a-fA-F]+")
 
 
@@ -72,48 +50,6 @@ def setup(engine: Engine, **others: object) -> Setup:
     said |= _model(engine.nominal_model)
     said["numbers"] = " ".join(engine.state_layout.offsets)
     return tuple(said.items())
-
-
-def with_new_names(saved: Mapping[str, Any]) -> Setup:
-    """Replace earlier names in a saved setup, with one deprecation warning.
-
-    >>> with_new_names({"operator": "Operator{strength: 200.0}"})
-    (('operator', 'Operator{strength: 200.0}'),)
-    """
-    texts = {str(name): str(value) for name, value in saved.items()}
-    new = {
-        RENAMED_OPTIONS.get(name, name): RENAMED_VALUES.get(name, {}).get(
-            text, _OLD_NAME.sub(lambda old: _RENAMED[old[1]], text)
-        )
-        for name, text in texts.items()
-    }
-    if "numbers" in new:
-        new["numbers"] = _OLD_NUMBER.sub(lambda old: _RENAMED_NUMBERS[old[1]], new["numbers"])
-    if new != texts:
-        warnings.warn(
-            "the state was saved by an earlier version, with names that have changed; it is read; "
-            "to_json() of it saves it with the new names",
-            DeprecationWarning,
-            stacklevel=4,
-        )
-    return tuple(new.items())
-
-
-def with_new_options(saved: Setup) -> Setup:
-    """Add the defaults of options that are newer than a saved setup.
-
-    >>> dict(with_new_options((("noise", "False"),)))["memory_at_start"]
-    'None'
-    """
-    texts = dict(saved)
-    missing = {name: _text(default) for name, default in _OPTIONS.items() if name not in texts}
-    if not missing:
-        return saved
-    named = [name for name in texts if name in _OPTIONS]
-    first = list(texts).index(named[0]) if named else len(texts)
-    options = {name: texts.get(name, missing.get(name, "")) for name in _OPTIONS}
-    others = [item for item in saved if item[0] not in _OPTIONS]
-    return (*others[:first], *options.items(), *others[first:])
 
 
 def differences(theirs: Setup, ours: Setup) -> str:
@@ -155,15 +91,10 @@ def _task(engine: Engine) -> dict[str, str]:
     said = {"task": task.name, "task.load": _text(task.load), "task.starts": _text(task.starts)}
     if task.exercise is not None:
         said["task.exercise"] = _text(task.exercise)
-    digest = hashlib.sha256(_structure(task).encode())
+    digest = hashlib.sha256(repr(task.structure).encode())
     digest.update(engine.table.references.tobytes())
     digest.update(engine._ideals.tobytes())
     return said | {"task.reference": f"{task.name} {digest.hexdigest()[:12]}"}
-
-
-def _structure(task: Task) -> str:
-    """What is compiled of a task as text, by the names that it was first written with."""
-    return repr(task.structure).replace("SafetyFilter(", "Guard(")
 
 
 def _model(model: Model) -> dict[str, str]:

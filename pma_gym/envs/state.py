@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from pma_gym.engine.snapshot import Snapshot, StateError
-from pma_gym.envs.setup import Setup, differences, with_new_names, with_new_options
+from pma_gym.envs.setup import Setup, differences
 from pma_gym.envs.state_models import model_document, parse_model_document
 
 FORM = "pma-gym environment state 1"
@@ -125,7 +125,7 @@ class EnvState(NamedTuple):
         arrays = {name: _decoded(value) for name, value in given.items()}
         generator = document["generator"]
         return cls(
-            with_new_options(with_new_names(document["setup"])),
+            tuple((str(name), str(value)) for name, value in document["setup"].items()),
             Snapshot(**arrays, models=models),
             _decoded(document["begun"]),
             _decoded(document["ended"]),

@@ -5,7 +5,6 @@ from collections.abc import Mapping
 from typing import Any
 
 from pma_gym.effects import CATALOGUE
-from pma_gym.effects.renamed_effects import with_present_names
 from pma_gym.engine.snapshot import StateError
 from pma_gym.plant.model import Model
 from pma_gym.plant.parameter_rows import Note
@@ -33,9 +32,8 @@ def parse_model_document(document: Mapping[str, Any]) -> Model:
         StateError: an unknown effect or parameter, or a value out of its bounds.
         ModelError: effects that do not form a plant.
     """
-    tables, kept = (with_present_names(document[key]) for key in ("parameters", "notes"))
-    parameters = {name: _parameters(name, p) for name, p in tables.items()}
-    notes = {path: _note(path, note) for path, note in kept.items()}
+    parameters = {name: _parameters(name, p) for name, p in document["parameters"].items()}
+    notes = {path: _note(path, note) for path, note in document["notes"].items()}
     name, title, plant = (str(document[key]) for key in ("name", "title", "plant"))
     return Model(name, title, plant, parameters, notes)
 

@@ -11,7 +11,6 @@ from typing import NamedTuple
 from pma_gym.data.trial_schedule import TrialSchedule
 from pma_gym.engine.nominal_rig import rest_load
 from pma_gym.plant.model import Model
-from pma_gym.renamed_names import renamed_attribute, renamed_names
 from pma_gym.tasks import Task
 
 
@@ -27,7 +26,6 @@ class Reference:
     """
 
     schedule: TrialSchedule
-    protocol = renamed_attribute("protocol", "schedule")
 
     def __call__(self, time: float) -> float:
         """The reference at a time (s)."""
@@ -102,6 +100,3 @@ class Measurement(NamedTuple):
     rotation: float
     load: float
     pressure: float
-
-
-__getattr__ = renamed_names(__name__, {"Station": StationInfo, "Reading": Measurement})

@@ -39,7 +39,6 @@ from pma_gym.envs.setup import SINGLE, Setup, setup
 from pma_gym.envs.specs import completed_spec
 from pma_gym.envs.state import EnvState, check_state, generator_at, generator_state
 from pma_gym.envs.summary import last_infos
-from pma_gym.renamed_names import renamed_attribute
 from pma_gym.tasks import Task
 
 OWN = (
@@ -396,8 +395,6 @@ class PMAVectorEnv(
         """
         late = self.options.observation_delay
         return np.stack([self.engine.numbers(f"{part}_{late}") for part in PARTS])
-
-    readings = renamed_attribute("readings", "measurements")
 
     @property
     def pressures(self) -> NDArray[np.float64]:

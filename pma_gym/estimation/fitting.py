@@ -25,7 +25,6 @@ from pma_gym.estimation.residuals import Residuals, Sums
 from pma_gym.integrator.equations import Interpolation
 from pma_gym.plant.compiled_model import DEFAULT_TOLERANCE
 from pma_gym.plant.model import Model
-from pma_gym.renamed_keywords import old_keywords
 
 __all__ = ["Fit", "Round", "fit"]
 
@@ -80,7 +79,6 @@ MOST_ROUNDS = 50
 _FIRST_DAMPING, _MOST_DAMPING = 1e-4, 1e12
 
 
-@old_keywords({"joined": "interpolation"}, {"joined": {True: "foh", False: "zoh"}})
 def fit(
     model: Model,
     trials: Sequence[Trial],

@@ -2,7 +2,6 @@
 
 import difflib
 import reprlib
-import warnings
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from importlib import resources
@@ -16,7 +15,6 @@ from pma_gym.documents import DocumentError, read_toml
 from pma_gym.effects import CATALOGUE, Effect
 from pma_gym.effects.effect import Parameters, Value
 from pma_gym.effects.ports import SENSOR_DELAY, Port, measured_output
-from pma_gym.effects.renamed_effects import with_present_names
 from pma_gym.limits import LimitError
 from pma_gym.paths import is_path, missing_file
 from pma_gym.plant.parameter_rows import Note, ParameterRow
@@ -267,7 +265,7 @@ def parse_model(document: Mapping[str, Any]) -> Model:
     for key in _HEAD[1:]:
         if not isinstance(document[key], str):
             raise ModelError(f'{key} must be a text, {key} = "...", got {_shown(document[key])}')
-    tables = _present_tables({key: value for key, value in document.items() if key not in _HEAD})
+    tables = {key: value for key, value in document.items() if key not in _HEAD}
     parameters, notes = {}, {}
     for effect, table in tables.items():
         values, table_notes = _split(effect, table)
@@ -275,21 +273,6 @@ def parse_model(document: Mapping[str, Any]) -> Model:
         notes |= table_notes
     head = {key: document[key] for key in ("name", "title", "plant")}
     return Model(**head, parameters=parameters, notes=notes)
-
-
-def _present_tables(tables: Mapping[str, Any]) -> dict[str, Any]:
-    """Tables by the effects' present names, with one warning if any was an earlier one."""
-    present = with_present_names(tables)
-    old = [
-        f"[{was}] is now [{now}]" for was, now in zip(tables, present, strict=True) if was != now
-    ]
-    if old:
-        warnings.warn(
-            f"the model has effects by earlier names: {', '.join(old)}; rename them in its file",
-            DeprecationWarning,
-            stacklevel=5,
-        )
-    return present
 
 
 def _split(effect: str, table: object) -> tuple[dict[str, Value], dict[str, Note]]:

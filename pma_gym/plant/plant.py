@@ -13,7 +13,6 @@ from pma_gym.plant.condition import Condition, check_commands
 from pma_gym.plant.equilibrium.solver import equilibrium_at
 from pma_gym.plant.memory_start import begun_at
 from pma_gym.plant.simulation import Run, simulate_all
-from pma_gym.renamed_keywords import old_keywords
 
 if TYPE_CHECKING:
     import control
@@ -90,7 +89,6 @@ class Plant(CompiledModel):
         condition.size = run.size
         condition.time += duration
 
-    @old_keywords({"joined": "interpolation"}, {"joined": {True: "foh", False: "zoh"}})
     def run(
         self,
         time: np.ndarray,
@@ -127,7 +125,6 @@ class Plant(CompiledModel):
         simulate_all(self.program, [run])
         return run.states, first.zero_contraction
 
-    @old_keywords({"joined": "interpolation"}, {"joined": {True: "foh", False: "zoh"}})
     def simulate(
         self,
         trial: Trial,

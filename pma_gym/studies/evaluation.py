@@ -21,8 +21,6 @@ from pma_gym.metrics import (
 )
 from pma_gym.pages.document import Paragraph, TextTable
 from pma_gym.pages.notebook import notebook_html
-from pma_gym.renamed_keywords import old_keywords
-from pma_gym.renamed_names import renamed_attribute
 from pma_gym.units import SI_FACTORS
 
 LONGEST_GAP = 0.2
@@ -34,7 +32,6 @@ _SAME_TIME = 1e-5
 """Distance from the grid below which a sample counts as on it (s); logs round their times."""
 
 
-@old_keywords({"protocol": "schedule"})
 @dataclass(frozen=True)
 class Evaluation:
     """One phase of one trial; in SI, a table's units where it is printed.
@@ -54,7 +51,6 @@ class Evaluation:
     regression: Regression
     rmse: float
     note: str = ""
-    protocol = renamed_attribute("protocol", "schedule")
 
     @property
     def percent_of_range(self) -> float:

@@ -1,6 +1,5 @@
 """Tasks: what to follow, what it is worth, when it ends, what is drawn and what disturbs."""
 
-from pma_gym.renamed_names import renamed_names
 from pma_gym.tasks.disturbances import DISTURBANCES, PULSE_S, Disturbances, Events
 from pma_gym.tasks.exercise import LOWEST_RATE_HZ, PACE, PLAN_ANGLES, Exercise
 from pma_gym.tasks.exercises import (
@@ -118,14 +117,3 @@ __all__ = [
     "unsafe",
     "varied_station",
 ]
-
-__getattr__ = renamed_names(
-    __name__,
-    {
-        "Human": Operator,
-        "Plan": MomentProfile,
-        "Mind": OperatorState,
-        "plan_of": moment_profile,
-        "obstacle": infeasibility_reason,
-    },
-)

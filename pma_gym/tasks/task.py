@@ -9,8 +9,6 @@ from numpy.typing import NDArray
 
 from pma_gym.data.trial_schedule import DISPLACEMENT, ROTATION, TrialSchedule
 from pma_gym.metrics import PHASE_DURATION, PHASE_SAMPLES, SAMPLE_RATE_HZ, rmse
-from pma_gym.renamed_keywords import old_keywords
-from pma_gym.renamed_names import renamed_attribute
 
 if TYPE_CHECKING:
     from pma_gym.tasks.exercise import Exercise
@@ -22,7 +20,6 @@ Actuator = Literal["motor", "regulator"]
 """Which of the two voltages a task's controller gives; the other one is held."""
 
 
-@old_keywords({"protocol": "schedule"})
 @dataclass(frozen=True)
 class Task:
     """A schedule to follow, who moves, and the pressures to do it at.
@@ -47,7 +44,6 @@ class Task:
     load: float = 0.0
     start_pressures: tuple[float, float] | None = None
     exercise: "Exercise | None" = None
-    protocol = renamed_attribute("protocol", "schedule")
 
     def __post_init__(self) -> None:
         """Refuse what no environment can do."""
@@ -155,7 +151,6 @@ TASKS: dict[str, Task] = {
 """The dissertation's two tasks; figures 31-36 show them. `EVERY_TASK` has the others too."""
 
 
-@old_keywords({"protocol": "schedule"})
 def phase_errors(
     schedule: TrialSchedule, position: NDArray[np.float64]
 ) -> dict[str, NDArray[np.float64]]:
@@ -174,7 +169,6 @@ def phase_errors(
     return errors
 
 
-@old_keywords({"protocol": "schedule"})
 def phase_rmse(schedule: TrialSchedule, position: NDArray[np.float64]) -> dict[str, float]:
     """RMSE of a position on the 384 Hz grid, of each phase begun and of them all together.
 

@@ -7,8 +7,8 @@ in which they are there, and another effect delays some.
 import numpy as np
 import pytest
 
-from benchmarks.accuracy.reference import TRIALS
 from pma_gym.effects import CATALOGUE
+from tests.integrator.reference import TRIALS
 
 DELAYING_NOTHING = (
     "drive_dead_zone",

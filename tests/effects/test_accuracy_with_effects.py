@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from benchmarks.accuracy.reference import TRIALS
 from pma_gym.plant.simulation import Run, simulate_all
+from tests.integrator.reference import TRIALS
 
 EVERY = (
     "passive_stretch",

@@ -12,12 +12,9 @@ import numpy as np
 import pytest
 from gymnasium.utils.env_checker import data_equivalence
 
-from pma_gym.engine.cuda.cpu_device import CpuDevice
-from pma_gym.engine.cuda.device_engine import DeviceEngine
-from pma_gym.engine.options import Options
 from pma_gym.envs import ENVIRONMENTS, PMAEnv, PMAVectorEnv
 from pma_gym.plant.model import load_model
-from pma_gym.tasks import EVERY_TASK, TASKS, following, varied_station
+from pma_gym.tasks import EVERY_TASK, following, varied_station
 
 COPIERS = {
     "pickle": lambda env: pickle.loads(pickle.dumps(env)),
@@ -250,15 +247,6 @@ def test_what_cannot_be_pickled_is_named_with_the_fix():
     env = PMAEnv(following("slow", "extension", Locked()))
     with pytest.raises(pickle.PicklingError, match=r"the motion of slow cannot.*; give a function"):
         pickle.dumps(env)
-
-
-def test_environments_on_a_device_say_that_they_cannot_be_copied():
-    engine = DeviceEngine(
-        TASKS["displacement"], Options(model="serres2008"), 2, "double", CpuDevice()
-    )
-    for made in (pickle.dumps, copy.copy, copy.deepcopy):
-        with pytest.raises(TypeError, match="DeviceEngine cannot be copied or pickled.*; make"):
-            made(engine)
 
 
 ELSEWHERE = """

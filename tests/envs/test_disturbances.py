@@ -3,14 +3,9 @@
 import numpy as np
 import pytest
 
-from pma_gym.engine.cuda.cpu_device import CpuDevice
-from pma_gym.engine.cuda.device_engine import DeviceEngine
-from pma_gym.engine.engine import Engine
-from pma_gym.engine.options import Options
 from pma_gym.envs import PMAEnv
 from pma_gym.plant.model import load_model
 from pma_gym.plant.plant import Plant
-from pma_gym.tasks import TASKS
 
 BOTH = "regulator_and_hand_push"
 
@@ -169,27 +164,6 @@ def test_a_batch_has_the_bits_of_environments_alone(twins):
     for _ in range(110):
         both.step(-0.8, -0.4)
     assert both.ends.sum() >= 17
-
-
-def test_threads_have_the_bits_of_the_processor():
-    task, options = TASKS["displacement"], Options(control_rate_hz=20.0, disturbances=BOTH)
-    for precision in ("double", "single"):
-        own = Engine(task, options, 7)
-        other = DeviceEngine(task, options, 7, precision, CpuDevice(3))
-        every = np.arange(7)
-        own.seed(every, [7 + i for i in range(7)])
-        own.reset(every)
-        other.reset(7)
-        for k in range(100):
-            actions = np.full((7, 1), -0.6 + 0.1 * np.sin(0.1 * k))
-            own.actions[:7] = actions
-            own.step()
-            seen, rewards, *_ = other.step(actions)
-            forces = own.numbers("memory_hand_push"), other.numbers("memory_hand_push")
-            assert np.array_equal(*forces)
-            if precision == "double":
-                assert np.array_equal(own.observations, seen)
-                assert np.array_equal(own.rewards, rewards)
 
 
 @pytest.mark.parametrize("tool", ["settle", "linearize", "simulate"])

@@ -8,9 +8,6 @@ import numpy as np
 import pytest
 
 from pma_gym.codegen.random import normals, philox
-from pma_gym.engine.cuda.cpu_device import CpuDevice
-from pma_gym.engine.cuda.device_engine import DeviceEngine
-from pma_gym.engine.options import Options
 from pma_gym.envs import PMAEnv, PMAVectorEnv
 from pma_gym.plant.exercise_device.device import own_device, resistive_moment
 from pma_gym.plant.exercise_device.knee import knee_share
@@ -241,21 +238,6 @@ def test_many_are_as_one(name, threads):
         np.testing.assert_array_equal(together[17], expected)
         assert rewards[17] == reward
     assert envs.station_info()["operator_nm"][17] == info["operator_nm"]
-    envs.close()
-
-
-def test_threads_of_a_device_play_the_same_operators():
-    name = "profile_exercise"
-    task, options = EXERCISES[name], Options(control_rate_hz=50.0)
-    made = DeviceEngine(task, options, 5, "double", CpuDevice())
-    envs = PMAVectorEnv(5, name, control_rate_hz=50.0, autoreset_mode="SameStep")
-    np.testing.assert_array_equal(made.reset(seed=7), envs.reset(seed=7)[0])
-    for k in range(780):
-        actions = np.full((5, 1), math.sin(0.1 * k))
-        observations, rewards, *_ = made.step(actions)
-        expected, wanted, *_ = envs.step(actions)
-        np.testing.assert_array_equal(observations, expected)
-        np.testing.assert_array_equal(rewards, wanted)
     envs.close()
 
 

@@ -6,10 +6,6 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-from pma_gym.engine.cuda.cpu_device import CpuDevice
-from pma_gym.engine.cuda.device_engine import DeviceEngine
-from pma_gym.engine.engine import Engine
-from pma_gym.engine.options import Options
 from pma_gym.envs import Measurement, PMAEnv
 from pma_gym.plant.model import load_model
 from pma_gym.plant.statics import contraction_at, muscle_force
@@ -160,26 +156,6 @@ def test_a_batch_has_the_bits_of_environments_alone(twins, options, mode):
     for k in range(160):
         both.step(-0.2, 1.0 if 60 < k < 80 else 0.2)
     assert both.ends[0].sum() > 5 and both.ends[1].sum() > 5
-
-
-def test_threads_have_the_bits_of_the_processor():
-    task, options = ISOTONIC["triangle_low"], Options(control_rate_hz=20.0)
-    own = Engine(task, options, 7)
-    other = DeviceEngine(task, options, 7, "double", CpuDevice(3))
-    every = np.arange(7)
-    own.seed(every, [7 + i for i in range(7)])
-    own.reset(every)
-    assert np.array_equal(other.reset(7), own.observations)
-    for k in range(250):
-        actions = np.full((7, 1), -0.3 + 0.1 * np.sin(0.1 * k))
-        own.actions[:7] = actions
-        own.step()
-        seen, rewards, terminated, truncated = other.step(actions)
-        assert np.array_equal(own.rewards, rewards)
-        over = np.flatnonzero(terminated | truncated)
-        if len(over):
-            own.reset(over)
-        assert np.array_equal(own.observations, seen)
 
 
 def test_the_picture_names_the_regulator(make):

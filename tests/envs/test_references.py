@@ -7,13 +7,9 @@ import pytest
 
 from pma_gym.data.trial_schedule import Phase, TrialSchedule
 from pma_gym.engine.cpu import kernel
-from pma_gym.engine.cuda.cpu_device import CpuDevice
-from pma_gym.engine.cuda.device_engine import DeviceEngine
-from pma_gym.engine.engine import Engine
-from pma_gym.engine.options import Options
 from pma_gym.envs import PMAEnv
 from pma_gym.metrics import rmse
-from pma_gym.tasks import TASKS, UNSEEN, following, multisine, phase_rmse, steps
+from pma_gym.tasks import TASKS, UNSEEN, following, multisine, phase_rmse
 
 FACTORS = {"mm": 1e-3, "deg": np.pi / 180}
 
@@ -87,28 +83,6 @@ def test_a_batch_has_the_bits_of_environments_alone(twins, options):
     for _ in range(120 if options else 110):
         both.step(-0.8, -0.3)
     assert both.ends.sum() >= (0 if options else 17)
-
-
-@pytest.mark.parametrize("precision", ["double", "single"])
-def test_threads_have_the_bits_of_the_processor(precision):
-    task, options = steps("rotation", 2), Options(control_rate_hz=20.0)
-    own = Engine(task, options, 7)
-    other = DeviceEngine(task, options, 7, precision, CpuDevice(3))
-    every = np.arange(7)
-    own.seed(every, [7 + i for i in range(7)])
-    own.reset(every)
-    other.reset(7)
-    for k in range(150):
-        actions = np.full((7, 1), -0.6 + 0.2 * np.sin(0.1 * k))
-        own.actions[:7] = actions
-        own.step()
-        seen, rewards, *_ = other.step(actions)
-        sums = own.numbers("sum_whole"), other.numbers("sum_whole")
-        if precision == "double":
-            assert np.array_equal(own.observations, seen) and np.array_equal(own.rewards, rewards)
-            assert np.array_equal(*sums)
-        else:
-            np.testing.assert_allclose(*sums, rtol=1e-3)
 
 
 def test_references_of_one_structure_share_their_code(make, monkeypatch):

@@ -174,25 +174,3 @@ def test_numpy_numbers_are_numbers_and_options_pickle_with_their_function():
     env = PMAEnv(reward=lambda error, *rest: np.float32(error), **MADE)
     assert all(type(reward) is float for reward in rewards_of(env))
     assert pickle.loads(pickle.dumps(PMAEnv(reward=absolute).options)).reward is absolute
-
-
-def test_a_device_says_that_it_calls_no_function():
-    from pma_gym.engine.cuda.cpu_device import CpuDevice
-    from pma_gym.engine.cuda.device_engine import DeviceEngine
-    from pma_gym.engine.options import Options
-    from pma_gym.tasks import TASKS
-
-    with pytest.raises(ValueError, match="reward must be a name where a device computes it"):
-        DeviceEngine(TASKS["displacement"], Options(reward=absolute), 2, "double", CpuDevice())
-    # A scale and a number of steps it has as the processor has them.
-    options = Options(reward_scale=0.5, max_episode_steps=7, control_rate_hz=10.0, pressure_kpa=300)
-    device = DeviceEngine(TASKS["displacement"], options, 2, "double", CpuDevice())
-    envs = PMAVectorEnv(2, reward_scale=0.5, max_episode_steps=7, control_rate_hz=10.0,
-        pressure_kpa=300)  # fmt: skip
-    device.reset(seed=1)
-    envs.reset(seed=1)
-    for step in range(1, 8):
-        _, rewards, terminated, truncated = device.step(np.zeros((2, 1)))
-        _, expected, *_ = envs.step(np.zeros((2, 1)))
-        np.testing.assert_allclose(rewards, expected, rtol=1e-6)
-        assert not terminated.any() and truncated.all() == (step == 7)

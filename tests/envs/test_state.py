@@ -3,7 +3,6 @@
 import base64
 import json
 import pickle
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -348,21 +347,3 @@ def test_a_planner_finds_what_a_search_by_hand_finds(single):
         plain = single({"randomisation": "varied", "noise": True})
         plain.reset(seed=6)
         assert sum((plain.step([action])[1] for action in path), 0.0) == total
-
-
-def test_a_state_that_an_earlier_version_saved_goes_on():
-    """It names `Human`, `Plan` and `Guard`; it was taken after five steps."""
-    options = {"operator": "typical", "disturbances": "regulator_and_hand_push"}
-    # A shipped model whose numbers are printed ones, so that they stay.
-    options |= {"control_rate_hz": 50.0, "pressure_kpa": 550.0, "model": "serres2008"}
-    env, other = PMAEnv("isotonic_exercise", **options), PMAEnv("isotonic_exercise", **options)
-    env.reset(seed=3)
-    for _ in range(5):
-        env.step(env.action(5.0))
-    text = Path(__file__).with_name("state_with_old_names.json").read_text()
-    with pytest.warns(DeprecationWarning, match="names that have changed") as said:
-        state = EnvState.from_json(text)
-    assert len(said) == 1 and said[0].filename == __file__
-    assert state == env.get_state()
-    other.set_state(state)
-    assert repr(other.step(other.action(4.0))) == repr(env.step(env.action(4.0)))

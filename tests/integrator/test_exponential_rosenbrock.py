@@ -6,7 +6,6 @@ from math import factorial
 import numpy as np
 import pytest
 
-from benchmarks.accuracy.convergence import FixedStep, orders, smooth_plant
 from pma_gym.codegen.graph import CHANGING, Graph
 from pma_gym.codegen.text import evaluate
 from pma_gym.integrator.equations import State
@@ -21,6 +20,7 @@ from pma_gym.integrator.exponential_rosenbrock import (
     TERMS,
     step,
 )
+from tests.integrator.convergence import FixedStep, orders, smooth_plant
 from tests.plant import smooth
 
 POLE = float(GAMMA)

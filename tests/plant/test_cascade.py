@@ -4,7 +4,6 @@ import control
 import numpy as np
 import pytest
 
-from benchmarks.accuracy.limits import with_effect
 from pma_gym.data.serres2008 import load_table
 from pma_gym.effects.drive.position_map import mapped_displacement
 from pma_gym.plant.model import load_model
@@ -40,7 +39,7 @@ def test_without_inertia_it_is_eq_22(pressure, before, after):
 
 def test_with_inertia_it_is_eq_10_and_the_muscle():
     inertial = {"inertia_kg_m2": 2e-3, "damping_ratio": 0.7}
-    model = with_effect(load_model("cascade"), "servo_inertia", inertial)
+    model = load_model("cascade").with_effects({"servo_inertia": inertial})
     plant, when, extension = stepped(model, 400e3, 1.0, 4.0)
     part = plant.model.parameters
     square = part["servo"].stiffness / 2e-3

@@ -5,7 +5,6 @@ import numpy as np
 import pytest
 import sympy
 
-from benchmarks.accuracy.limits import with_effect
 from pma_gym.plant.forms.linear import linearize, operating_point
 from pma_gym.plant.forms.symbolic import symbolic
 from pma_gym.plant.model import load_model
@@ -123,8 +122,8 @@ def numerical(plant, rates):
     return lambda state, *given: np.array(evaluate(*state, *given, *known.values()))
 
 
-INERTIAL = with_effect(
-    load_model("cascade"), "servo_inertia", {"inertia_kg_m2": 2e-3, "damping_ratio": 0.7}
+INERTIAL = load_model("cascade").with_effects(
+    {"servo_inertia": {"inertia_kg_m2": 2e-3, "damping_ratio": 0.7}}
 )
 
 

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from benchmarks.accuracy.reference import demanding_commands
 from pma_gym.integrator.step_attempt import first_size
 from pma_gym.plant.condition import Condition
 from pma_gym.plant.forms.plain import PlainPlant
 from pma_gym.plant.plant import Plant
 from pma_gym.plant.program import FIRST_S
+from tests.integrator.reference import demanding_commands
 
 MODELS = ("serres2008", "station", "cascade")
 

@@ -19,18 +19,10 @@ TRAINING_SEED = 7001
 """Of the cases that the forest learns from; no set that is judged has it."""
 
 
-def _old_name(names: str) -> str:
-    """Warn of an option that has another name now."""
-    if names:
-        typer.echo("warning: --ways is now --baselines; use that name", err=True)
-    return names
-
-
 @app.command()
 def run(
     cases: Annotated[Path, typer.Option(help="Folder that `draw` or `take` wrote.", exists=True)],
     baselines: Annotated[str, typer.Option(help="By commas; all if empty.")] = "",
-    old_baselines: Annotated[str, typer.Option("--ways", hidden=True, callback=_old_name)] = "",
     jobs: Jobs = 1,
     seed: Annotated[int, typer.Option(help="Of what a baseline draws.")] = 0,
     json_file: Annotated[Path | None, typer.Option("--json", help="Figures to a file.")] = None,
@@ -44,7 +36,7 @@ def run(
     from benchmarks.hidden_effects.baselines.registry import BASELINES
     from pma_gym.files import replace_file
 
-    chosen = [name for name in (baselines or old_baselines).split(",") if name] or list(BASELINES)
+    chosen = [name for name in baselines.split(",") if name] or list(BASELINES)
     for name in chosen:
         if name not in BASELINES:
             known = ", ".join(BASELINES)

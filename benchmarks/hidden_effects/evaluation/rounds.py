@@ -16,7 +16,6 @@ from benchmarks.hidden_effects.evaluation.verdicts import compare, judged
 from benchmarks.hidden_effects.generation.cases import Case, measure
 from benchmarks.hidden_effects.generation.experiment_library import Volts, random_experiment
 from benchmarks.hidden_effects.physics.simulation import RATE
-from pma_gym.discovery.result.next_experiment import proposed_excitation
 
 CHOOSERS = ("proposed", "random")
 """Who chooses the experiment. The random one's length is that of the first proposal."""
@@ -55,7 +54,7 @@ def _chosen(chooser: str, case: Case, answer: Answer, rounds: int, judge: Judge)
         if chooser == "random":
             words, volts = random_experiment(g, rows)
         elif answer.document is not None:
-            words = proposed_excitation(answer.document["next_experiment"])
+            words = answer.document["next_experiment"]["excitation"]
         case = with_trial(case, volts, g)
         begun = time.perf_counter()
         answer = asked(case, case.truth["number"], judge)

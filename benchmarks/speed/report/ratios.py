@@ -87,8 +87,6 @@ TARGETS = (
     Target("first step after the start, compiled before", ("start/warm",), 0.6, (), "seconds"),
     Target("first step after the start, compiled anew", ("start/cold",), 4, (), "seconds"),
     Target("20 candidates fitted to 60 trials of 10 s", ("fits/own",), 15, (), "seconds"),
-    Target("GPU, float32", ("gpu/float32/*",), 1e9),
-    Target("GPU, float64", ("gpu/float64/*",), 3e8),
 )
 """What is wanted."""
 

@@ -37,8 +37,7 @@ def speed_tables(document: Mapping[str, Any]) -> list[SpeedTable]:
         _batches(_of(known, "batch")),
         _right_hand_sides(known),
         _arithmetic(known),
-        _tolerances(_of(known, "tolerances")),
-        _others(_of(known, "rollouts", "learning", "gpu"), "training", "Training, and the GPU"),
+        _others(_of(known, "rollouts", "learning"), "training", "Training"),
         _times(_of(known, "start"), "start", "The first step"),
         _times(_of(known, "fits"), "fits", "Fits"),
         _ratios(document["ratios"]),
@@ -157,23 +156,6 @@ def _arithmetic(rows: Sequence[Row]) -> SpeedTable:
         cells.append([title, *numbers, f"{1e9 * step:.0f} ns", reached])
     header = ["One thread", "An attempt", "A control step", "Per second", "Time", "Reached"]
     return SpeedTable("arithmetic", "Arithmetic, and what one core can do", header, cells)
-
-
-def _tolerances(rows: Sequence[Row]) -> SpeedTable:
-    cells = [
-        [
-            f"{row['number'] * 1e-6:.2g}",
-            f"{row['facts']['attempts']:.1f}",
-            f"{row['facts']['position_error']:.1e}",
-            f"{row['facts']['worst_error']:.1e}",
-            f"{1e6 / row['median']:.3g} us",
-            spread(row),
-        ]
-        for row in rows
-    ]
-    header = ["Tolerance", "Attempts in 10 ms", "Position", "Worst state", "Time", "±"]
-    title = "What exactness costs: errors as shares of the range, time of 10 ms"
-    return SpeedTable("tolerances", title, header, cells, words=0)
 
 
 def _others(rows: Sequence[Row], name: str, title: str) -> SpeedTable:

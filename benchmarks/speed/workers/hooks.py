@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING, Any
 import gymnasium as gym
 import numpy as np
 
-from benchmarks.speed.loops import ACTIONS, Missing, Prepared
+from benchmarks.speed.loops import ACTIONS, Prepared
 from benchmarks.speed.rows import EVALUATIONS
-from pma_gym.envs import ENVIRONMENTS
 from pma_gym.plant.plant import Plant
 
 if TYPE_CHECKING:
@@ -94,20 +93,3 @@ def joint_fits(candidates: int, trials: int, seconds: float) -> Prepared:
         return 1
 
     return Prepared(chunk)
-
-
-def gpu(name: str, count: int, precision: str) -> Prepared:
-    """Control steps on a CUDA device.
-
-    Args:
-        name: the environment's id.
-        count: number of environments.
-        precision: `float32` or `float64`.
-    """
-    from benchmarks.speed.gpu import prepare
-    from pma_gym.codegen.machine.cuda_driver import GpuError
-
-    try:
-        return prepare(ENVIRONMENTS[name], count, precision)
-    except GpuError as error:
-        raise Missing(str(error)) from error

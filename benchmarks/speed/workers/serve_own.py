@@ -1,11 +1,10 @@
-"""This package: single environments, batches, its integrator's steps, starts, fits, the GPU.
+"""This package: single environments, batches, its integrator's steps, starts, fits.
 
 What differs between versions of the package is in `hooks`.
 """
 
 import multiprocessing
 from contextlib import suppress
-from functools import cache
 from multiprocessing.connection import Connection
 from typing import Any
 
@@ -13,12 +12,10 @@ import gymnasium as gym
 import numpy as np
 
 import pma_gym.envs  # noqa: F401 - registers the environments
-from benchmarks.accuracy.job import Commands, Error, demanding_commands, error_ladder, simulated
 from benchmarks.speed.core import core
 from benchmarks.speed.loops import ACTIONS, BATCHES, Missing, Prepared, single, vector
 from benchmarks.speed.starts import start
 from benchmarks.speed.workers import hooks
-from pma_gym.plant.plant import Plant
 
 PACKAGES = ("pma-gym", "gymnasium", "numpy", "scipy")
 
@@ -105,35 +102,6 @@ def _beside(connection: Connection, name: str, count: int) -> None:
             connection.send(steps)
 
 
-def tolerances(model: str, millionths: int) -> Prepared:
-    """Control steps of the plant alone in a demanding trial, at a tolerance."""
-    tolerance = millionths * 1e-6
-    plant = Plant(model, tolerance)
-    rest = plant.settle(0.0, 350e3)
-    commands: Commands = demanding_commands(plant, 350e3)
-    steps = len(commands.time) - 1
-
-    def chunk() -> int:
-        simulated(plant, rest, commands)
-        return steps
-
-    return Prepared(chunk, lambda: _facts(_error(model, tolerance)))
-
-
-@cache
-def _error(model: str, tolerance: float) -> Error:
-    return error_ladder(model, (tolerance,))[0]
-
-
-def _facts(error: Error) -> dict[str, Any]:
-    return {
-        "position_error": error.position,
-        "worst_state": error.worst_state,
-        "worst_error": error.states[error.worst_state],
-        "attempts": error.attempts,
-    }
-
-
 def _evaluations(environment: Any) -> dict[str, float]:  # noqa: ANN401 - of either kind
     return {"right_hand_sides": hooks.right_hand_sides_per_step(environment)}
 
@@ -144,8 +112,6 @@ ROWS = {
     "kernel": kernel,
     "batch": batch,
     "pair": pair,
-    "tolerances": tolerances,
     "start": start,
     "fits": hooks.joint_fits,
-    "gpu": hooks.gpu,
 }

@@ -25,7 +25,6 @@ from controllers.policies.adapter import base_of
 from controllers.policies.observation_spec import ObservationSpec
 from pma_gym.documents import is_file, read_yaml
 from pma_gym.engine.options import parse_options, parse_task
-from pma_gym.engine.renamed_options import first_names, renamed_options
 from pma_gym.envs import ENVIRONMENTS
 
 PRESETS = Path(__file__).parents[1] / "presets"
@@ -110,7 +109,7 @@ class Preset:
             "view": self.view.to_json(),
             "form": self.form.to_json(),
             "stations": self.stations,
-            "options": first_names(self.options),
+            "options": dict(self.options),
             "environments": self.environments,
             "steps": self.steps,
             "average_share": self.average_share,
@@ -195,7 +194,7 @@ def _parsed(name: str, algorithm: str, environment: str, entry: object) -> Prese
         ObservationSpec.of(mapping("view", wrapper["view"])),
         ActionMapping.of({"base": None} | mapping("form", wrapper["form"])),
         str(wrapper.get("stations", "")),
-        renamed_options(mapping("options", wrapper.get("options", {})), f"preset {name}"),
+        mapping("options", wrapper.get("options", {})),
         environments,
         steps,
         average,

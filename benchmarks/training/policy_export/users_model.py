@@ -31,10 +31,8 @@ ALGORITHMS = {
 ACTOR_CRITIC = (
     "stable_baselines3.common.policies",
     "pma_gym.sb3.policy",
-    "pma_gym.envs.sb3_policy",
 )
-"""Where policies are that PPO shares with A2C, this package's by its old name too; only PPO has a
-`clip_range`."""
+"""Where policies are that PPO shares with A2C; only PPO has a `clip_range`."""
 
 UNREADABLE = (
     zipfile.BadZipFile,

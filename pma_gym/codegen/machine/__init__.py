@@ -1,1 +1,1 @@
-"""Machine code: traced arithmetic to LLVM (SIMD) and PTX, compiled and called."""
+"""Machine code: traced arithmetic to LLVM (SIMD), compiled and called."""

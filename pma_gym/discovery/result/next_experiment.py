@@ -1,11 +1,9 @@
 """The experiment that a diagnosis proposes."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 from pma_gym.data.trial import Trial
-from pma_gym.renamed_names import renamed_attribute
 
 
 @dataclass(frozen=True)
@@ -26,8 +24,6 @@ class NextExperiment:
     minutes: float
     trial: Trial
 
-    protocol = renamed_attribute("protocol", "excitation")
-
     def document(self) -> dict[str, Any]:
         """The experiment in `diagnosis.json`; its commands are a file beside it."""
         return {
@@ -37,8 +33,3 @@ class NextExperiment:
             "minutes": self.minutes,
             "file": "next.csv",
         }
-
-
-def proposed_excitation(experiment: Mapping[str, Any]) -> str:
-    """The excitation of `next_experiment` in a `diagnosis.json`; older files call it `protocol`."""
-    return experiment["excitation" if "excitation" in experiment else "protocol"]

@@ -63,9 +63,6 @@ class KernelSpec(Protocol):
 class BlockMemory:
     """Reads and writes the numbers of environments.
 
-    What differs on other machines is in its methods (`pma_gym.engine.cuda.thread_memory`) and in
-    these attributes.
-
     Args:
         kernel: what is written, and for how many lanes.
 

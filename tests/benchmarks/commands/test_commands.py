@@ -12,13 +12,12 @@ from benchmarks.reproduction import job
 from benchmarks.runner import run
 from benchmarks.suites.frozen import load_suite
 
-COMMANDS = ["profiles", "studies", "identify", "tune", "accuracy"]
+COMMANDS = ["profiles", "studies", "identify", "tune"]
 
 
 @pytest.fixture
 def nothing_runs(monkeypatch):
     """Every command's work is a failure of the test."""
-    from benchmarks.accuracy import job as accuracy_job
     from benchmarks.dissertation import profiles, studies
     from benchmarks.identification import job as identification_job
     from benchmarks.tuning import tune
@@ -27,7 +26,6 @@ def nothing_runs(monkeypatch):
         raise AssertionError("it ran")
 
     modules = {
-        "accuracy": accuracy_job,
         "identify": identification_job,
         "profiles": profiles,
         "studies": studies,

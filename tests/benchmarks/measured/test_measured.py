@@ -1,4 +1,4 @@
-"""The dissertation's tables as trials, their diagnosis in rounds, and the reverse."""
+"""The dissertation's tables as trials and their diagnosis in rounds."""
 
 from io import StringIO
 from types import SimpleNamespace
@@ -22,20 +22,17 @@ from benchmarks.measured.job import (
     write_trials,
 )
 from benchmarks.measured.pages import measured_page
-from benchmarks.measured.reverse import NOTHING, Explanation, Summary
 from benchmarks.measured.rounds import Round, rounds
 from benchmarks.measured.smooth import smooth_errors
 from benchmarks.measured.stages import Stages
 from benchmarks.measured.steps import Step
-from benchmarks.measured.tables import COLUMNS, print_measured, reverse_text
+from benchmarks.measured.tables import COLUMNS, print_measured
 from benchmarks.measured.trials import measured_dataset
 from benchmarks.measured.triangles import TRIANGLES, Held
 from pma_gym.data.datasets.dataset import read_dataset
 from pma_gym.data.files.trial_files import TrialWarning
 from pma_gym.data.serres2008 import load_table
 from pma_gym.discovery.preparation.initial_floors import initial_floors
-from pma_gym.discovery.preparation.noise import white_noise
-from pma_gym.discovery.preparation.whitened_residuals import WhitenedResiduals
 from pma_gym.discovery.result.candidate import ADDED
 from pma_gym.estimation.logged import Logged
 from pma_gym.plant.model import load_model
@@ -210,24 +207,6 @@ def test_a_stage_answers_its_own_question_and_has_what_it_needs(tmp_path):
     assert stages.kept("step_1", "question", made_otherwise) is None
 
 
-def test_a_reverse_that_is_kept_is_not_searched_again(tmp_path, monkeypatch):
-    searches, explained = (
-        [],
-        [[Explanation(NOTHING, {"rotor.radius_mm": 29.7}, 1.0, 2.0, 3.0, 4.0)]],
-    )
-
-    def searched(*_):
-        searches.append(1)
-        return explained
-
-    monkeypatch.setattr(job, "searched", searched)
-    for _ in range(2):
-        assert job._reverse(Stages(tmp_path, code="this"), None) == explained
-    assert len(searches) == 1
-    assert job._reverse(Stages(tmp_path, True, "newer"), None) == explained
-    assert len(searches) == 2
-
-
 def test_fits_of_other_code_do_not_go_into_a_diagnosis(tmp_path):
     older, newer = Stages(tmp_path, code="older"), Stages(tmp_path, code="newer")
     assert older.journal != newer.journal
@@ -236,11 +215,10 @@ def test_fits_of_other_code_do_not_go_into_a_diagnosis(tmp_path):
 def test_the_command_says_what_is_to_be_made_anew(tmp_path, monkeypatch):
     orders = []
     monkeypatch.setattr(job, "run_measured", lambda *_, recompute: orders.append(recompute))
-    for options in ([], ["--recompute"], ["--again"]):
+    for options in ([], ["--recompute"]):
         done = CliRunner().invoke(app, ["measured", "--out", str(tmp_path), *options])
         assert done.exit_code == 0, done.output
-        assert ("warning: --again is now --recompute" in done.stderr) == ("--again" in options)
-    assert orders == [False, True, True]
+    assert orders == [False, True]
 
 
 def test_a_worked_muscle_has_no_warmth_left():
@@ -248,21 +226,6 @@ def test_a_worked_muscle_has_no_warmth_left():
     model = load_model("serres2008").with_effects({"warm_up": warm})
     assert worked(model).parameters["warm_up"].repeat == 1000.0
     assert worked(load_model("station")).parameters == load_model("station").parameters
-
-
-def test_a_pulley_of_another_size_is_found_in_the_summaries():
-    """Figures that another pulley would leave are explained by it, at pressures left out too."""
-    model, path = load_model("station"), "rotor.radius_mm"
-    whole = Summary.measured(model)
-    # The displacement at 550 kPa and the rotation at 275 kPa.
-    chosen = np.where(whole.rotation, whole.pressure == 275.0, whole.pressure == 550.0)
-    parts = whole.trials[8:10], whole.tasks[8:10], whole.pressure[chosen], whole.rotation[chosen]
-    noise = tuple(white_noise(1.0) for _ in range(4))
-    whitened = WhitenedResiduals(model, parts[0], (path,), noise, np.array([np.inf]))
-    made = Summary(*parts, np.zeros(chosen.sum())).residuals(whitened, np.array([28.0]))
-    explained = Summary(*parts, made).explained(path, model, (path,), np.array([[26.5]]))
-    assert explained.values[path] == pytest.approx(28.0, abs=0.05)
-    assert explained.left_out_mm < 0.05
 
 
 def test_strokes_of_the_printed_validation():
@@ -289,11 +252,6 @@ def step(name, effects, error):
 
 
 def test_the_page_and_the_tables_say_what_was_found():
-    explained = [
-        Explanation("rotor.radius_mm", {"rotor.radius_mm": 29.7}, 1.0, 1.1, 0.5, 1.2),
-        Explanation("creep", {}, 1.1, 1.2, 0.9, 1.3),
-        Explanation(NOTHING, {}, 2.4, 2.4, 0.5, 2.8),
-    ]
     result = Measured(
         rounds=[
             Round(47, "effect", "It is creep.", ("creep",), {"creep": 0.001},
@@ -307,7 +265,6 @@ def test_the_page_and_the_tables_say_what_was_found():
         smooth={key: 0.7 for key, _ in COLUMNS},
         not_detectable=[Undecidable("regulator_delay", "regulator_delay", None, 1)],
         proposals=[Proposal("pressure steps", ("regulator_delay",), 0.2)],
-        reverse=[explained],
         held=[Held(28, "station", 17.2, (11.1, 11.8), 1.7, 1.94)],
         seconds=1.0,
         settings={"model": "serres2008"},
@@ -320,6 +277,3 @@ def test_the_page_and_the_tables_say_what_was_found():
         assert "regulator delay" in text
         assert "undecidable" in text
         assert "hysteresis" in text
-    words = " ".join(reverse_text(result))
-    assert "rotor.radius mm leaves 1.10 mm" in words
-    assert "creep (but worse in displacement)" in words

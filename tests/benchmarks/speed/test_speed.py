@@ -245,4 +245,4 @@ def test_the_page_takes_its_figures_from_a_whole_run(tmp_path, monkeypatch):
     assert "| CartPole-v1 | 20 ms; 4 states, one Euler step | 100 | 0 % |" in refreshed_text
     assert f"<!-- figures: batches -->\n\n{page.ABSENT}" in refreshed_text
     assert page.refreshed(refreshed_text, json.loads(path.read_text())) == refreshed_text
-    assert set(re.findall(r"figures: (\w+)", text)) >= {"setting", "ratios", "tolerances", "absent"}
+    assert set(re.findall(r"figures: (\w+)", text)) >= {"setting", "ratios", "absent"}

@@ -18,8 +18,8 @@ from pma_gym.envs import PMAEnv
 from pma_gym.plant.model import dump_model, load_model
 
 FROZEN = {
-    "exercise": (2, "f428d1bb4d8a6430"),
-    "hard": (3, "d79b0b05653da9d9"),
+    "exercise": (2, "4e88e70f8d6b6c47"),
+    "hard": (3, "1f3b7c3c6387bc97"),
     "many": (2, "b974962a2da6c913"),
     "nominal": (2, "3e4e11ff0657afc7"),
     "pressure": (2, "542aca9f3d87993f"),

@@ -1,8 +1,6 @@
 """The page of a diagnosis: whole, self-contained, in words, for every verdict."""
 
 import re
-import subprocess
-import sys
 from functools import cache
 from html.parser import HTMLParser
 
@@ -110,21 +108,6 @@ def test_every_effect_has_words(name):
     if CATALOGUE[name].law is not None:
         assert effect_summary(name).endswith(".")
         effect_equation(name)
-
-
-def test_the_page_is_found_at_its_old_place_with_a_warning():
-    with pytest.warns(DeprecationWarning, match="is now in pma_gym.discovery.report.page"):
-        from pma_gym.discovery.report import report_page as old
-    assert old is report_page
-    with pytest.raises(ImportError, match="nothing_such"):
-        from pma_gym.discovery.report import nothing_such  # noqa: F401
-
-
-def test_a_name_that_reports_lack_is_refused_before_the_page_is_loaded():
-    """The import of the page asks for the page by name, and must not ask itself for ever."""
-    asked = "import pma_gym.discovery.report as r; print(hasattr(r, 'nothing'))"
-    ran = subprocess.run([sys.executable, "-c", asked], capture_output=True, text=True, check=True)
-    assert ran.stdout == "False\n"
 
 
 @pytest.mark.parametrize("verdict", VERDICTS)

@@ -9,7 +9,6 @@ import pytest
 
 from pma_gym.data.trial import Trial
 from pma_gym.discovery.report.verdict_text import sentence
-from pma_gym.discovery.result.next_experiment import NextExperiment, proposed_excitation
 from pma_gym.discovery.screening.autocorrelation import SURE, AutocorrelationTest
 from pma_gym.discovery.verdict import decision, unknown
 from pma_gym.discovery.verdict.adequacy import Adequacy
@@ -415,16 +414,3 @@ def test_a_scatter_that_slopes_alone_tell_is_not_believed_where_nothing_is_left(
     left = ResidualFraction(2.0 * unknown.DOUBTFUL, 0.0)
     reason = unknown.why_unknown(made_up(), left, [])
     assert (reason.why, reason.by, reason.figure) == ("scatters", "pressure", 5.86)
-
-
-def test_old_names_of_the_answer_are_read_with_a_warning():
-    diagnosis = diagnosed("hysteresis")
-    with pytest.warns(DeprecationWarning, match=r"Diagnosis\.blind is now not_detectable") as said:
-        assert diagnosis.blind == diagnosis.not_detectable
-    assert len(said) == 1 and said[0].filename == __file__
-    following = NextExperiment("a ramp", ("creep",), 30.0, 1.0, laboratory("nothing")[0][0])
-    with pytest.warns(DeprecationWarning, match=r"NextExperiment\.protocol is now excitation"):
-        assert getattr(following, "protocol") == "a ramp"  # noqa: B009
-    written = following.document()
-    assert proposed_excitation(written) == written["excitation"] == "a ramp"
-    assert proposed_excitation({"protocol": "a ramp"}) == "a ramp"

@@ -5,7 +5,7 @@ wherever the cable tightens: the right-hand side has a kink there, and dry frict
 way travelled since.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,6 +14,7 @@ from scipy.integrate import solve_ivp
 
 from pma_gym.plant.condition import Condition
 from pma_gym.plant.plant import Plant
+from pma_gym.plant.simulation import Run, simulate_all
 
 CONTROL_PERIOD = 0.01
 """Time from one command to the next (s)."""
@@ -173,3 +174,52 @@ def shares(states: NDArray[np.float64], truth: NDArray[np.float64]) -> NDArray[n
     size = np.maximum(np.abs(truth).max(axis=0), 1e-300)
     moved = np.ptp(truth, axis=0)
     return np.abs(states - truth).max(axis=0) / np.where(moved > 1e-6 * size, moved, size)
+
+
+MODELS = ("serres2008", "station", "cascade")
+PRESSURES = (200e3, 350e3, 550e3)
+STATE_LIMIT, POSITION_LIMIT = 1e-4, 1e-6
+"""Largest errors at the default tolerance in the demanding trial, as shares of the range: any
+state, and the positions."""
+
+POSITIONS = ("contraction", "angle", "extension", "servo")
+
+
+@dataclass(frozen=True)
+class Error:
+    """Error and price of the demanding trial at a tolerance.
+
+    Attributes:
+        states: largest error of each state over all pressures, as a share of its range.
+        attempts: attempts at internal steps in a control step of 10 ms.
+    """
+
+    states: dict[str, float]
+    attempts: float
+
+    @property
+    def position(self) -> float:
+        """Largest error of a position."""
+        return max(error for name, error in self.states.items() if name in POSITIONS)
+
+
+def error_ladder(model: str, tolerances: Sequence[float]) -> list[Error]:
+    """Errors of a model over the demanding trial at all pressures, one entry a tolerance."""
+    plants = [Plant(model, tolerance) for tolerance in tolerances]
+    worst, attempts = np.zeros((len(plants), len(plants[0].states))), np.zeros(len(plants))
+    for pressure in PRESSURES:
+        start = plants[0].settle(0.0, pressure)
+        commands = demanding_commands(plants[0], pressure)
+        truth = reference(plants[0], start, commands)
+        for row, plant in enumerate(plants):
+            run = Run(
+                *(commands.time, commands.motor, commands.regulator),
+                *("zoh", plant.table, start.state, start.zero_contraction),
+            )
+            attempts[row] += simulate_all(plant.program, [run])
+            worst[row] = np.maximum(worst[row], shares(run.states, truth))
+    attempts /= len(PRESSURES) * (len(commands.time) - 1)
+    return [
+        Error(dict(zip(plants[0].states, row.tolist(), strict=True)), made)
+        for row, made in zip(worst, attempts.tolist(), strict=True)
+    ]

@@ -4,10 +4,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from pma_gym.effects import CATALOGUE
 from pma_gym.effects.muscle.stiffness import spring_stiffness
 from pma_gym.plant.condition import Condition
-from pma_gym.plant.model import Model, load_model
+from pma_gym.plant.model import load_model
 from pma_gym.plant.plant import Plant
 
 FRICTIONLESS = {
@@ -136,55 +135,3 @@ def _released(plant: Plant, pressure: float) -> Condition:
     state = start.state.copy()
     state[plant.states.index("contraction")] = 0.0
     return Condition(state, zero_contraction=1.0)
-
-
-def motor_inertia_effect(inertia: float, pressure: float = 400e3) -> float:
-    """Compute the change of the cascade's step response by the motor's inertia.
-
-    Args:
-        inertia: of the motor (kg m^2), at a damping ratio of 0.7.
-        pressure: gauge pressure (Pa).
-    Returns:
-        Largest difference from the response without inertia, as a share of the step.
-    """
-    inertial = {"inertia_kg_m2": inertia, "damping_ratio": 0.7}
-    return _largest_change(
-        load_model("cascade"),
-        with_effect(load_model("cascade"), "servo_inertia", inertial),
-        pressure,
-    )
-
-
-def rotor_inertia_effect(factor: float, model: str = "station", pressure: float = 400e3) -> float:
-    """Compute the change of the station's 1 V step response by another rotor inertia.
-
-    Args:
-        factor: on the model's own inertia, itself an assumption.
-        model: name of the model.
-        pressure: gauge pressure (Pa).
-    Returns:
-        Largest difference of contraction, as a share of the step.
-    """
-    nominal = load_model(model)
-    inertia = nominal.values_in_files("rotor")["inertia_kg_m2"]
-    assert isinstance(inertia, float)
-    changed = nominal.replace({"rotor.inertia_kg_m2": factor * inertia})
-    return _largest_change(nominal, changed, pressure)
-
-
-def with_effect(model: Model, effect: str, values: dict[str, float]) -> Model:
-    """The model with one more effect, given in file units."""
-    parameters = {**model.parameters, effect: CATALOGUE[effect].parse(values)}
-    return Model(model.name, model.title, model.plant, parameters, model.notes)
-
-
-def _largest_change(one: Model, other: Model, pressure: float) -> float:
-    responses = []
-    for model in (one, other):
-        plant = Plant(model)
-        start = plant.settle(3.0, pressure)
-        when = np.linspace(0.0, 1.0, 1001)
-        regulator = np.full(1001, plant.regulator_voltage(pressure))
-        states, zero = plant.run(when, np.full(1001, 4.0), regulator, condition=start)
-        responses.append(plant.observe(states, zero)["contraction"])
-    return float(np.abs(responses[1] - responses[0]).max() / np.ptp(responses[0]))

@@ -1,1 +1,0 @@
-"""Accuracy of the simulation: against scipy, and in limits of the equations."""

@@ -1,1 +1,0 @@
-"""Error budget of open-loop control: `python -m benchmarks budget`."""

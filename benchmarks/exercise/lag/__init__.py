@@ -1,1 +1,0 @@
-"""Three bounds on the error of an exercise that the regulator's lag sets."""

@@ -1,1 +1,0 @@
-"""Experimental: environments on an NVIDIA GPU; not yet run on one, tested on the processor."""
