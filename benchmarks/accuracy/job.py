@@ -35,7 +35,6 @@ from benchmarks.accuracy.reference import (
     simulated,
 )
 from benchmarks.files import write_text
-from benchmarks.speed.rows import EVALUATIONS
 from pma_gym.plant.compiled_model import DEFAULT_TOLERANCE
 from pma_gym.plant.condition import Condition
 from pma_gym.plant.model import Model
@@ -52,6 +51,10 @@ __all__ = [
     "run_accuracy",
     "simulated",
 ]
+
+EVALUATIONS = 3
+"""Evaluations of the right-hand side in an attempt at an internal step: where the step begins, with
+its Jacobian as one more, and at the stage."""
 
 MODELS = ("serres2008", "station", "cascade")
 PRESSURES = (200e3, 350e3, 550e3)
