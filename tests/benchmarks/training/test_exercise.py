@@ -116,12 +116,6 @@ def test_rewards_are_bounded_before_they_are_scaled():
     assert bounded(-1e4, True) == BROKEN_REWARD
 
 
-def test_a_scale_must_be_positive_and_leaves_older_trainings_theirs(preset):
-    small = preset()
-    assert "reward_scale" not in small.to_json()
-    assert small.changed(reward_scale=0.01).to_json()["reward_scale"] == 0.01
-
-
 # -- stations --------------------------------------------------------------------------------------
 
 
