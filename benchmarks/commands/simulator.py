@@ -19,7 +19,7 @@ def speed(
     ] = None,
     check: Annotated[
         bool,
-        typer.Option(help="Only what shows a loss of vectorisation; exit code 1 if so."),
+        typer.Option(help="Only ratios that hold everywhere; exit code 1 if one does not."),
     ] = False,
     only: Annotated[
         str, typer.Option(help="Rows by commas, such as single or 'batch/own*'; all if empty.")
@@ -27,8 +27,7 @@ def speed(
     quick: Annotated[bool, typer.Option(help="A smoke run, whose figures say little.")] = False,
 ) -> None:
     """Measure this package's speed beside other simulators' (`make peers` installs them)."""
-    from benchmarks.speed.rows import RequestError
-    from benchmarks.speed.run import run_speed
+    from benchmarks.speed.run import RequestError, run_speed
 
     try:
         code = run_speed(json_file, check, only, quick)

@@ -58,6 +58,9 @@ def train(
     patience: Annotated[
         int, typer.Option(min=0, help="Validations without progress, then end; 0: never.")
     ] = 0,
+    ship: Annotated[
+        bool, typer.Option("--ship", help="Write one seed's policy where the package's lie too.")
+    ] = False,
     jobs: Jobs = 1,
     executor: ExecutorOption = LOCAL,
 ) -> None:
@@ -73,8 +76,10 @@ def train(
         if folder.exists() and not folder.is_dir():
             raise PresetError(f"--out {folder} is a file; name a folder")
         order = ordered(algo, task, preset, seed, steps, device, threads, patience)
+        if ship and seeds > 1:
+            raise PresetError(f"--ship takes one seed, got --seeds {seeds}; name it by --seed")
         if seeds == 1 and executor is LOCAL:
-            run_train(order, folder, SafeConsole())
+            run_train(order, folder, SafeConsole(), ship)
             return
         numbers = range(seed, seed + seeds)
         folders = [out / f"seed-{n}" if out else usual / f"{task}-{n}" for n in numbers]

@@ -14,7 +14,10 @@ from pathlib import Path
 from benchmarks.remake.versions import model_digest
 from benchmarks.runner.fingerprint import ROOT
 from benchmarks.suites.frozen import frozen_suite, suite_names
+from benchmarks.training.card import train_words
 from benchmarks.tuning.design import designable
+from controllers.policies.policy_file import load_policy_file
+from controllers.policy import shipped_policies
 
 MODEL = Path("pma_gym/models/station.toml")
 GAINS = Path("controllers/design/gains.toml")
@@ -84,10 +87,10 @@ def chain(jobs: int = 2) -> list[Step]:
         ),
         Step(
             "policies",
-            "policies, trained, judged and shipped",
-            tuple(_policies(workers)),
+            "policies, trained and shipped",
+            tuple(_policies()),
             searched,
-            40.0,
+            2.0,
         ),
         Step(
             "scores",
@@ -108,11 +111,12 @@ def chain(jobs: int = 2) -> list[Step]:
     ]
 
 
-def _policies(workers: Sequence[str]) -> Iterable[tuple[str, ...]]:
-    # A folder a model: what was trained on another one is no policy of this.
-    folder = ("--out", f"results/training/study-{model_digest()}")
-    for command in (("run", *workers), ("judge", *workers), ("conditions",), ("report", "--ship")):
-        yield ("-m", "benchmarks.training.study", *command, *folder)
+def _policies() -> Iterable[tuple[str, ...]]:
+    """Every policy that ships, trained as it was."""
+    for path in shipped_policies():
+        # A folder a model: what was trained on another one is no policy of this.
+        folder = f"results/training/{model_digest()}/{path.stem}"
+        yield (*train_words(load_policy_file(path)), "--out", folder, "--ship")
 
 
 TABLES = (Path("benchmarks/identification"), Path("pma_gym/data/serres2008"))

@@ -7,15 +7,13 @@ here is named with pip's reason and left out; the others go on.
 import shutil
 import subprocess
 import sys
-from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from benchmarks.speed.peers import PEERS, ROOT, Peer, executable
+from benchmarks.speed.peers import PEERS, ROOT, Peer
 
 _PIP = ("-m", "pip", "install", "--disable-pip-version-check", "--no-input", "--quiet")
-INTERRUPTED = 130
 
 
 class InstallError(RuntimeError):
@@ -31,24 +29,16 @@ def install(peer: Peer) -> None:
     shutil.rmtree(peer.home, ignore_errors=True)
     peer.home.parent.mkdir(exist_ok=True)
     _run(sys.executable, "-m", "venv", str(peer.home))
-    python = str(executable(peer.home))
-    for arguments in steps(peer):
-        _run(python, *_PIP, *arguments)
-    peer.stamp.write_text(peer.wanted, encoding="utf-8")
-
-
-def steps(peer: Peer) -> list[list[str]]:
-    """Arguments of pip, one list a call."""
-    constrained = ["-c", str(ROOT / "constraints.txt")]
-    calls = []
+    constrained = ("-c", str(ROOT / "constraints.txt"))
     if peer.project is not None:
         # As `make test` does: PyTorch first, so that its pin decides which build comes.
-        calls += [[*constrained, "torch"]] if peer.project else []
-        calls += [[*constrained, "-e", f"{ROOT}[{peer.project}]" if peer.project else str(ROOT)]]
-    if peer.pins:
+        for name in ("torch", "-e") if peer.project else ("-e",):
+            project = f"{ROOT}[{peer.project}]" if peer.project else str(ROOT)
+            _run(str(peer.interpreter), *_PIP, *constrained, name, *[project] * (name == "-e"))
+    if peer.pinned:
         # The pins are complete; what a package asks for beyond them, the worker does not use.
-        calls += [["--no-deps", "-r", str(peer.pins)]]
-    return calls
+        _run(str(peer.interpreter), *_PIP, "--no-deps", "-r", str(peer.pins))
+    peer.stamp.write_text(peer.digest, encoding="utf-8")
 
 
 def _run(*command: str) -> None:
@@ -70,40 +60,24 @@ def main(
     ] = None,
 ) -> None:
     """Install what the speed of this package is compared with, into .peers/."""
-    known = [name for name, peer in PEERS.items() if peer.installed]
+    known = {peer.name: peer for peer in PEERS if peer.installed}
     for name in names or ():
         if name not in known:
             print(f"error: unknown peer {name!r}; known: {', '.join(known)}", file=sys.stderr)
             raise typer.Exit(2)
-    chosen = [PEERS[name] for name in names or known]
-    failed = []
+    chosen, failed = [known[name] for name in names or known], []
     for peer in chosen:
         try:
-            print(f"{peer.title}: {_installed(peer)}", flush=True)
+            if peer.python is None:
+                print(f"{peer.title}: installing (some minutes)", flush=True)
+                install(peer)
+            print(f"{peer.title}: installed", flush=True)
         except InstallError as error:
             failed.append(peer.title)
             print(f"{peer.title}: left out, it could not be installed: {error}", flush=True)
-        except KeyboardInterrupt:
-            print(f"interrupted; {peer.title} is not installed", file=sys.stderr)
-            raise typer.Exit(INTERRUPTED) from None
     if failed:
         print(f"Left out: {', '.join(failed)}. The benchmark runs without them.")
     raise typer.Exit(1 if len(failed) == len(chosen) else 0)
-
-
-def _installed(peer: Peer) -> str:
-    """Install a peer if need be; what was done."""
-    if peer.is_here:
-        return "this environment has it"
-    if peer.is_ready:
-        return f"is installed in {_shown(peer.home)}"
-    print(f"{peer.title}: installing (some minutes)", flush=True)
-    install(peer)
-    return f"installed in {_shown(peer.home)}"
-
-
-def _shown(path: Path) -> str:
-    return str(path.relative_to(ROOT))
 
 
 if __name__ == "__main__":

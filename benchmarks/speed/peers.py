@@ -1,4 +1,4 @@
-"""Whom this package is compared with: their packages, and the environments that these live in.
+"""What is measured, in one table, and the environments that the others live in.
 
 What needs more than this package's core has an environment of its own, `.peers/NAME`, which
 `make peers` makes from the pins in `requirements/NAME.txt`.
@@ -6,30 +6,30 @@ What needs more than this package's core has an environment of its own, `.peers/
 
 import hashlib
 import importlib.util
+import os
 import sys
 import tomllib
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 ROOT = Path(__file__).resolve().parents[2]
 FOLDER = ROOT / ".peers"
 """Where the environments are; ignored by git."""
 
-_PINS = Path(__file__).resolve().parent / "requirements"
-_STAMP = ".installed"
-
 
 @dataclass(frozen=True)
 class Peer:
-    """One worker: what it compares with and what it needs.
+    """The packages that some rows need.
 
     Attributes:
-        name: its own name and its environment's folder; its worker is `workers/serve_NAME.py`.
+        name: of its environment's folder.
         title: its name for readers.
         pinned: whether it has an environment of its own with the pins in `requirements`.
         project: extras of this project that its environment has, "" for the core alone; None if
-            it has not this project. With extras, this very interpreter serves if it has them.
-        modules: what this interpreter must have to serve.
+            it has not this project.
+        modules: what this interpreter must have to serve in place of that environment.
     """
 
     name: str
@@ -40,13 +40,13 @@ class Peer:
 
     @property
     def installed(self) -> bool:
-        """Whether `make peers` installs it: it does not live in this project's environment."""
+        """Whether `make peers` installs it."""
         return self.pinned or self.project is not None
 
     @property
-    def pins(self) -> Path | None:
-        """The file of its pins, if it has one."""
-        return _PINS / f"{self.name}.txt" if self.pinned else None
+    def pins(self) -> Path:
+        """The file of its pins."""
+        return Path(__file__).resolve().parent / "requirements" / f"{self.name}.txt"
 
     @property
     def home(self) -> Path:
@@ -56,20 +56,22 @@ class Peer:
     @property
     def stamp(self) -> Path:
         """A file that says what was installed, written last."""
-        return self.home / _STAMP
+        return self.home / ".installed"
 
     @property
-    def wanted(self) -> str:
+    def digest(self) -> str:
         """What the stamp says if the installation is that of these pins."""
-        texts = [self.pins.read_text(encoding="utf-8")] if self.pins else []
+        texts = [self.pins.read_text(encoding="utf-8")] if self.pinned else []
         if self.project is not None:
-            texts.append((ROOT / "constraints.txt").read_text(encoding="utf-8"))
-            texts += _dependencies(self.project)
+            project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+            asked = project["project"]
+            texts += [(ROOT / "constraints.txt").read_text(encoding="utf-8")]
+            texts += asked["dependencies"] + asked["optional-dependencies"].get(self.project, [])
         return hashlib.sha256("\0".join(texts).encode()).hexdigest()[:16]
 
     @property
     def is_here(self) -> bool:
-        """Whether this interpreter has all packages of the worker."""
+        """Whether this interpreter has all packages of the peer."""
         if self.modules:
             return all(importlib.util.find_spec(name) for name in self.modules)
         return not self.installed
@@ -77,50 +79,131 @@ class Peer:
     @property
     def is_ready(self) -> bool:
         """Whether its environment is complete."""
-        return self.stamp.is_file() and self.stamp.read_text(encoding="utf-8") == self.wanted
+        return self.stamp.is_file() and self.stamp.read_text(encoding="utf-8") == self.digest
+
+    @property
+    def interpreter(self) -> Path:
+        """The interpreter of its environment, installed or not."""
+        return self.home / ("Scripts/python.exe" if os.name == "nt" else "bin/python")
 
     @property
     def python(self) -> Path | None:
-        """The interpreter that runs its worker; None if it is not installed."""
+        """The interpreter that measures its rows; None if it is not installed."""
         if self.is_here:
             return Path(sys.executable)
-        return executable(self.home) if self.is_ready else None
-
-    @property
-    def absence(self) -> str:
-        """Why it has no interpreter."""
-        if self.stamp.is_file():
-            return "its pins have changed since it was installed; `make peers` installs it anew"
-        return "not installed; `make peers` installs it"
+        return self.interpreter if self.is_ready else None
 
 
-def _dependencies(extra: str) -> list[str]:
-    """What this project asks for, alone and with an extra."""
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-    return project["dependencies"] + project["optional-dependencies"].get(extra, [])
+OWN, GYMNASIUM, SCIPY = Peer("own", "pma-gym"), Peer("classic", "Gymnasium"), Peer("scipy", "scipy")
+MUJOCO = Peer("mujoco", "MuJoCo", pinned=True)
+DM_CONTROL = Peer("dm_control", "dm_control", pinned=True)
+ENVPOOL = Peer("envpool", "EnvPool", pinned=True)
+GYMNAX = Peer("gymnax", "gymnax", pinned=True)
+MOTOR = Peer("electric_motor", "gym-electric-motor", pinned=True)
+PCGYM = Peer("pcgym", "PC-gym", pinned=True)
+DOMPC = Peer("dompc", "do-mpc", pinned=True, project="")
+SB3 = Peer("sb3", "Stable-Baselines3", project="rl", modules=("torch", "stable_baselines3"))
+
+PEERS = (OWN, GYMNASIUM, SCIPY, MUJOCO, DM_CONTROL, ENVPOOL, GYMNAX, MOTOR, PCGYM, DOMPC, SB3)
 
 
-def executable(home: Path) -> Path:
-    """The interpreter of a virtual environment."""
-    if sys.platform == "win32":
-        return home / "Scripts" / "python.exe"
-    return home / "bin" / "python"
+@dataclass(frozen=True)
+class Row:
+    """One thing to measure.
+
+    Attributes:
+        key: group/contender, or group/contender/number.
+        title: the contender and its step, for readers.
+        peer: who has the packages.
+        make: the function of `worker` that prepares it.
+        settings: keyword arguments of that function.
+        cores: cores that it needs.
+    """
+
+    key: str
+    title: str
+    peer: Peer
+    make: str
+    settings: Mapping[str, Any] = field(default_factory=dict)
+    cores: int = 1
 
 
-PEERS = {
-    peer.name: peer
-    for peer in (
-        Peer("own", "pma-gym"),
-        Peer("classic", "Gymnasium"),
-        Peer("scipy", "scipy"),
-        Peer("mujoco", "MuJoCo", pinned=True),
-        Peer("dm_control", "dm_control", pinned=True),
-        Peer("envpool", "EnvPool", pinned=True),
-        Peer("gymnax", "gymnax", pinned=True),
-        Peer("electric_motor", "gym-electric-motor", pinned=True),
-        Peer("pcgym", "PC-gym", pinned=True),
-        Peer("dompc", "do-mpc", pinned=True, project=""),
-        Peer("sb3", "Stable-Baselines3", project="rl", modules=("torch", "stable_baselines3")),
-    )
-}
-"""All workers by name."""
+DISPLACEMENT, ROTATION = "pma_gym/IsokineticDisplacement-v0", "pma_gym/IsokineticRotation-v0"
+COUNTS, ENVPOOL_COUNTS, SYNC_COUNTS = (1, 64, 1024, 16384, 262144), (64, 1024, 16384), (64, 1024)
+"""Numbers of environments; EnvPool holds each as an object of its own, and copies in a Python loop
+are no cheaper by the dozen."""
+
+
+def all_rows() -> list[Row]:
+    """Every row, in the order of the table."""
+    return [*_single(), *_batches(), *_learning()]
+
+
+def _single() -> Iterator[Row]:
+    step = "10 ms; 11 states, sensors, noise, reward"
+    yield Row("single/own", f"pma-gym, displacement: {step}", OWN, "one", {"name": DISPLACEMENT})
+    yield Row("single/own_rotation", f"pma-gym, rotation: {step}", OWN, "one", {"name": ROTATION})
+    for key, peer, name, step in (
+        ("CartPole", GYMNASIUM, "CartPole-v1", "20 ms; 4 states, one Euler step"),
+        ("Pendulum", GYMNASIUM, "Pendulum-v1", "50 ms; 2 states, one Euler step"),
+        ("InvertedPendulum", MUJOCO, "InvertedPendulum-v5", "40 ms; two Runge-Kutta steps"),
+    ):
+        yield Row(f"single/{key}", f"{name}: {step}", peer, "one", {"name": name})
+    step = "20 ms; 2 states, one Euler step"
+    yield Row("single/dm_control", f"dm_control pendulum: {step}", DM_CONTROL, "dm_control")
+    for drive in ("Cont-CC-PMSM", "Finite-CC-PMSM", "Cont-CC-PermExDc", "Cont-CC-SeriesDc"):
+        title, settings = f"gym-electric-motor {drive}: 0.1 ms of a drive", {"name": f"{drive}-v0"}
+        settings["library"] = "gym_electric_motor"
+        yield Row(f"single/gem_{drive}", title, MOTOR, "one", settings)
+    yield Row("single/pcgym", "PC-gym reactor: 13 s; 2 states, CVODES", PCGYM, "reactor")
+    step = "10 ms of pma-gym's plant alone"
+    yield Row("plant/dompc", f"do-mpc simulator, CVODES at 1e-6: {step}", DOMPC, "do_mpc")
+    for method, rtol in (("LSODA", 1e-5), ("RK45", 1e-4)):
+        title, settings = (
+            f"solve_ivp, {method} at {rtol:g}: {step}",
+            {"method": method, "rtol": rtol},
+        )
+        yield Row(f"plant/{method}", title, SCIPY, "solve_ivp", settings)
+
+
+def _batches() -> Iterator[Row]:
+    own, two, classic = {"name": DISPLACEMENT}, {"name": DISPLACEMENT, "threads": 2}, "CartPole-v1"
+    yield from _sizes("own", "pma-gym, 1 thread", OWN, "vector", own, COUNTS)
+    yield from _sizes("own_two", "pma-gym, 2 threads", OWN, "vector", two, ENVPOOL_COUNTS)
+    for toy in ("CartPole", "Pendulum"):
+        named = {"name": f"{toy}-v1"}
+        looped, title = named | {"mode": "sync"}, f"SyncVectorEnv {toy}"
+        yield from _sizes(f"sync_{toy}", title, GYMNASIUM, "vector", looped, SYNC_COUNTS)
+        title = f"EnvPool {toy}"
+        yield from _sizes(f"envpool_{toy}", title, ENVPOOL, "envpool", named, ENVPOOL_COUNTS)
+        yield from _sizes(f"gymnax_{toy}", f"gymnax {toy}", GYMNAX, "gymnax", named, COUNTS)
+    title = f"Gymnasium's array of {classic}"
+    yield from _sizes("vector_CartPole", title, GYMNASIUM, "vector", {"name": classic}, COUNTS)
+
+
+def _sizes(
+    key: str,
+    title: str,
+    peer: Peer,
+    make: str,
+    settings: Mapping[str, Any],
+    counts: tuple[int, ...],
+) -> Iterator[Row]:
+    for count in counts:
+        each = {**settings, "count": count}
+        cores = each.get("threads", 1)
+        yield Row(f"batch/{key}/{count}", f"{title}, {count}", peer, make, each, cores)
+
+
+def _learning() -> Iterator[Row]:
+    for make in ("rollouts", "learning"):
+        title, toy = f"PPO {make}, 8 copies of Pendulum-v1", {"name": "Pendulum-v1", "count": 8}
+        yield Row(f"{make}/Pendulum/8", title, SB3, make, toy)
+    for make, count, options in (
+        ("rollouts", 64, {}),
+        ("rollouts", 256, {}),
+        ("learning", 256, {"batch_size": 4096, "threads": 2}),
+    ):
+        title = f"PPO {make}, pma-gym, batch of {count}"
+        settings = {"name": DISPLACEMENT, "count": count, "n_steps": 128} | options
+        yield Row(f"{make}/own/{count}", title, SB3, make, settings)

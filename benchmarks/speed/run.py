@@ -1,38 +1,75 @@
-"""The command `speed`: measure, print, write, judge."""
+"""The command `speed`: rounds over all rows, their medians, and the ratios with targets.
+
+Every round measures every row once, in a new process and another order, so a slow minute of the
+machine falls on all rows alike; a ratio is taken within each round, then its median.
+"""
 
 import json
+import os
+import random
+import subprocess
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from fnmatch import fnmatchcase
 from pathlib import Path
+from statistics import median, quantiles
 
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
 from benchmarks.files import write_text
-from benchmarks.speed.measure import QUICK, Measurement, Repetition
-from benchmarks.speed.report.document import Document, document, started
-from benchmarks.speed.report.ratios import (
-    CHECKS,
-    TARGETS,
-    Target,
-    Verdict,
-    judge_all,
-    neighbours,
-    wanted_rows,
-)
-from benchmarks.speed.report.tables import SpeedTable, rate, speed_tables
-from benchmarks.speed.rows import RequestError, Row, all_rows, select
+from benchmarks.runner.environment_info import environment_info
+from benchmarks.speed.peers import ROOT, Row, all_rows
 from pma_gym.files import OutputError, check_output
 from pma_gym.terminal import SafeConsole
 
 DONE, FAILED, INTERRUPTED = 0, 1, 130
 """Exit codes."""
 
-WIDTH = 120
-"""Characters of a line where there is no terminal."""
+SEED, LONGEST_S, PAUSE_S = 2008, 600.0, 0.02
+"""Of the order; longest time of a measurement with all that it compiles (s); time before one (s),
+in which threads of the last that still spin go to sleep."""
+
+ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+"""What holds libraries to one thread, unless a row asks them for more."""
+
+SINGLE, BATCH = "single/own", "batch/own/1024"
+
+CHECKS = (
+    (SINGLE, "single/CartPole", 1.7),
+    (BATCH, "batch/sync_Pendulum/1024", 18.0),
+    (BATCH, SINGLE, 3.0),
+    ("batch/own_two/1024", BATCH, 1.5),
+)
+"""This package's row, a pattern of rows the fastest of which divides it, and the least ratio: what
+falls short when a step has more overhead, or a batch is no longer computed in lanes or by threads.
+"""
+
+TARGETS = (
+    *CHECKS,
+    (SINGLE, "single/Pendulum", 2.9),
+    (SINGLE, "single/InvertedPendulum", 6.0),
+    (SINGLE, "single/gem_*", 30.0),
+    (SINGLE, "single/pcgym", 100.0),
+    (SINGLE, "plant/dompc", 120.0),
+    (BATCH, "batch/envpool_CartPole/1024", 1.8),
+    ("rollouts/own/64", "rollouts/Pendulum/8", 9.0),
+    ("rollouts/own/256", "rollouts/Pendulum/8", 18.0),
+    ("learning/own/256", "learning/Pendulum/8", 30.0),
+)
+
+Rates = Mapping[str, Mapping[int, float]]
+"""Steps per second by the row's key and the number of the round."""
+
+
+class RequestError(ValueError):
+    """A request that cannot be met; the message names reason and alternatives."""
+
+
+class Absent(Exception):
+    """A row that cannot be measured; the message says why."""
 
 
 def run_speed(
@@ -45,8 +82,8 @@ def run_speed(
     """Measure this package beside what is installed of others.
 
     Args:
-        json_file: file for all figures, if any.
-        check: measure only what shows a loss of vectorisation, and judge it.
+        json_file: file for all figures of a run that ends, if any.
+        check: measure only the rows of `CHECKS`, and judge them.
         only: patterns of rows by commas; all if empty.
         quick: a smoke run, whose figures say little.
         console: where to print; the terminal if not given.
@@ -56,94 +93,176 @@ def run_speed(
         RequestError: the file cannot be written, or a pattern matches no row.
     """
     if json_file is not None:
-        _check(json_file)
-    # A file or a pipe has no width of its own.
-    console = console or (SafeConsole() if sys.stdout.isatty() else SafeConsole(width=WIDTH))
-    if quick:
-        console.print("A smoke run: it shows that all works, its figures say little.")
+        try:
+            check_output(json_file)
+        except OutputError as error:
+            raise RequestError(f"--json: {error}") from None
+    console = console or (SafeConsole() if sys.stdout.isatty() else SafeConsole(width=120))
     targets = CHECKS if check else TARGETS
-    rows = chosen_rows(targets if check else (), only)
-    together = neighbours(targets, [row.key for row in rows])
-    measurement = Measurement(rows, QUICK if quick else Repetition(), together=together)
-    info, begin = started(), time.perf_counter()
+    rows = select(only, all_rows())
+    if check:
+        rows = [row for row in rows if any(matches(row.key, p) for one in CHECKS for p in one[:2])]
+    rounds, seconds = (2, 0.05) if quick else (7, 0.5)
+    rates: dict[str, dict[int, float]] = {row.key: {} for row in rows}
+    absences: dict[str, str] = {}
+    code = DONE
     try:
-        _measure(measurement, console)
+        _measure(rows, rounds, seconds, rates, absences, console)
     except KeyboardInterrupt:
+        code = INTERRUPTED
         console.print("Interrupted: what follows is what was measured so far.")
-    verdicts = judge_all(targets, measurement.rows)
-    report = document(measurement, verdicts, info, time.perf_counter() - begin)
-    for table in speed_tables(report):
-        console.print(_table(table))
-    if json_file is not None:
-        _write(report, json_file, console)
-    if not measurement.complete:
-        return INTERRUPTED
-    return _checked(verdicts, console) if check else DONE
+    _print(rows, rates, absences, console)
+    verdicts = [(target, ratio(target, rates)) for target in targets]
+    missed = _judge(verdicts, console)
+    if json_file is not None and code == DONE:
+        content = environment_info() | {"rounds": rounds, "seconds": seconds}
+        write_text(json_file, json.dumps(content | {"per_second": rates, "absent": absences}))
+        console.print(f"Written to {json_file}", highlight=False)
+    return code or (FAILED if check and _fails(missed, rows) else DONE)
 
 
-def chosen_rows(targets: Sequence[Target], only: str) -> list[Row]:
-    """The rows that targets compare, or all if there are none, further chosen by patterns."""
-    rows = all_rows()
-    if targets:
-        keys = set(wanted_rows(targets, [row.key for row in rows]))
-        rows = [row for row in rows if row.key in keys]
-    return select(only, rows)
+def select(patterns: str, rows: list[Row]) -> list[Row]:
+    """Rows whose key matches one of some patterns, by commas; all if empty.
+
+    A pattern is a key with * for any text, or what keys begin with: `single`, `batch/own`.
+
+    Raises:
+        RequestError: a pattern that matches nothing; names the groups and contenders.
+    """
+    chosen = [part.strip().rstrip("/") for part in patterns.split(",") if part.strip()]
+    for pattern in chosen:
+        if not any(matches(row.key, pattern) for row in rows):
+            stems = dict.fromkeys("/".join(row.key.split("/")[:2]) for row in rows)
+            raise RequestError(f"--only: no row {pattern!r}; there are {', '.join(stems)}")
+    return [row for row in rows if not chosen or any(matches(row.key, p) for p in chosen)]
 
 
-def partial_file(json_file: Path) -> Path:
-    """Return the file of an interrupted run: beside the last whole run, never over it."""
-    return json_file.with_name(f"{json_file.stem}.partial.json")
+def matches(key: str, pattern: str) -> bool:
+    """Whether a key is meant by a pattern: the same with * for any text, or what it begins with."""
+    return fnmatchcase(key, pattern) or fnmatchcase(key, f"{pattern}/*")
 
 
-def _check(json_file: Path) -> None:
+def _measure(
+    rows: Sequence[Row],
+    rounds: int,
+    seconds: float,
+    rates: dict[str, dict[int, float]],
+    absences: dict[str, str],
+    console: Console,
+) -> None:
+    order = random.Random(SEED)
+    for number in range(rounds):
+        with console.status(f"Round {number + 1} of {rounds}"):
+            for row in order.sample(rows, len(rows)):
+                if row.key in absences:
+                    continue
+                try:
+                    rates[row.key][number] = measure(row, seconds)
+                except Absent as reason:
+                    absences[row.key] = str(reason)
+
+
+def measure(row: Row, seconds: float) -> float:
+    """Steps per second of a row, measured for a while (s) in a process of its own.
+
+    Raises:
+        Absent: it cannot be measured here, or its process failed.
+    """
+    if (os.cpu_count() or 1) < row.cores:
+        raise Absent(f"needs {row.cores} cores")
+    if row.peer.python is None:
+        raise Absent(f"{row.peer.title} is not installed with these pins; `make peers` does it")
+    worker = str(Path(__file__).with_name("worker.py"))
+    command = [str(row.peer.python), "-P", worker, row.make, json.dumps(row.settings), str(seconds)]
+    time.sleep(PAUSE_S)
     try:
-        check_output(json_file)
-        check_output(partial_file(json_file))
-    except OutputError as error:
-        raise RequestError(f"--json: {error}") from None
+        done = subprocess.run(
+            command,
+            cwd=ROOT,
+            env=os.environ | ONE_THREAD,
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            text=True,
+            timeout=LONGEST_S,
+        )
+    except subprocess.TimeoutExpired:
+        raise Absent(f"took longer than {LONGEST_S:g} s") from None
+    if done.returncode:
+        words = done.stderr.strip().splitlines()[-1:]
+        raise Absent(": ".join([f"its process ended with exit code {done.returncode}", *words]))
+    answer = json.loads(done.stdout.splitlines()[-1])
+    return answer["steps"] / answer["seconds"]
 
 
-def _measure(measurement: Measurement, console: Console) -> None:
-    columns = (
-        TextColumn("{task.description}", markup=False),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeRemainingColumn(),
-        TextColumn("{task.fields[last]}", markup=False),
-    )
-    with Progress(*columns, console=console, transient=True) as progress:
-        bar = progress.add_task("measuring", total=measurement.work, last="")
-        measurement.run(lambda title: progress.update(bar, advance=1, last=title))
+def ratio(target: tuple[str, str, float], rates: Rates) -> list[float]:
+    """A target's ratio in every round that has both rows; the fastest of the others counts."""
+    own, pattern, _ = target
+    others = [one for key, one in rates.items() if one and matches(key, pattern)]
+    if not others:
+        return []
+    other, mine = max(others, key=lambda one: median(one.values())), rates.get(own, {})
+    return [mine[number] / other[number] for number in sorted(mine.keys() & other.keys())]
 
 
-def _write(report: Document, json_file: Path, console: Console) -> None:
-    path = json_file if report["complete"] else partial_file(json_file)
-    write_text(path, json.dumps(report, indent=1) + "\n")
-    console.print(f"Written to {path}", highlight=False)
+def _print(
+    rows: Sequence[Row], rates: Rates, absences: Mapping[str, str], console: Console
+) -> None:
+    table = _table("Row", "What", "Steps/s", "±")
+    for row in rows:
+        values = list(rates[row.key].values())
+        if values:
+            table.add_row(row.key, row.title, rate(median(values)), spread(values))
+    console.print(table)
+    for key, why in absences.items():
+        console.print(f"Left out: {key}: {why}", highlight=False, markup=False)
 
 
-def _checked(verdicts: Sequence[Verdict], console: Console) -> int:
-    """Exit code of a check: what could not be measured does not count as passed."""
-    failed = [v for v in verdicts if v.word == "missed" or (v.got is None and not v.excused)]
-    for verdict in failed:
-        print(f"failed: {_sentence(verdict)}", file=sys.stderr)
-    if not failed:
-        console.print("The check passed: batches are computed in lanes and on all threads.")
-    return FAILED if failed else DONE
+def _judge(
+    verdicts: Sequence[tuple[tuple[str, str, float], list[float]]], console: Console
+) -> list[tuple[str, str]]:
+    """Print the ratios; returns the rows of those that are missed or not measured."""
+    table, missed = _table("Row", "Over", "At least", "Median", "±"), []
+    for (own, other, least), ratios in verdicts:
+        middle = median(ratios) if ratios else None
+        if middle is None or middle < least:
+            missed.append((own, other))
+        cells = ("not measured", "") if middle is None else (f"{middle:.3g}", spread(ratios))
+        table.add_row(own, other, f"{least:g}", *cells)
+    console.print(table)
+    return missed
 
 
-def _sentence(verdict: Verdict) -> str:
-    target = verdict.target
-    if verdict.got is None:
-        return f"{target.title}: not measured: {verdict.absence}"
-    return f"{target.title}: {rate(verdict.got[1])}, at least {rate(target.limit)} wanted"
+def _fails(missed: Sequence[tuple[str, str]], rows: Sequence[Row]) -> bool:
+    """Whether a check fails: what this machine has too few cores for is excused."""
+    cores = {row.key: row.cores for row in rows}
+    failed = [pair for pair in missed if cores.get(pair[0], 1) <= (os.cpu_count() or 1)]
+    for own, other in failed:
+        print(f"failed: {own} over {other}: too slow, or not measured", file=sys.stderr)
+    return bool(failed)
 
 
-def _table(content: SpeedTable) -> Table:
-    table = Table(title=content.title, title_justify="left", box=SIMPLE_HEAD, pad_edge=False)
-    for number, name in enumerate(content.header):
-        words = number < content.words
-        table.add_column(name, justify="left" if words else "right", no_wrap=not words)
-    for row in content.rows:
-        table.add_row(*row)
+def _table(*header: str) -> Table:
+    table = Table(box=SIMPLE_HEAD, pad_edge=False)
+    for name in header:
+        table.add_column(name, no_wrap=name != "What")
     return table
+
+
+def spread(values: Sequence[float]) -> str:
+    """Half of what lies between the quartiles, in percent of the median."""
+    if len(values) < 2:
+        return ""
+    low, middle, high = quantiles(values, n=4, method="inclusive")
+    return f"{50.0 * (high - low) / middle:.0f} %"
+
+
+def rate(value: float) -> str:
+    """A rate in three digits.
+
+    >>> rate(1234567.0), rate(20000.0), rate(950.0)
+    ('1.23 M', '20.0 k', '950')
+    """
+    for factor, letter in ((1e6, " M"), (1e3, " k")):
+        if value >= 0.9995 * factor:
+            return f"{value / factor:#.3g}".rstrip(".") + letter
+    return f"{value:.3g}"

@@ -1,96 +1,343 @@
-"""The process that measures: started in a peer's environment, told by lines of JSON what to do.
+"""Measures one row: run in a peer's environment, where little else is installed.
 
-    python -P worker.py MODULE
+    python -P worker.py MAKE SETTINGS SECONDS
 
-MODULE has a table ROWS of functions, each of which prepares a row: it takes the row's settings as
-keywords and returns a `Prepared`. After loading it the worker says
-
-    {"ready": true, "versions": {"numpy": "2.4.6", ...}}
-
-and then answers each request, a line, with a line:
-
-    {"prepare": KEY, "row": FUNCTION, "settings": {...}}    {"prepared": SECONDS}
-    {"measure": KEY, "seconds": 0.5}                        {"steps": N, "seconds": S, "facts": {}}
-
-or, in place of either answer, {"missing": WHY} for what cannot be measured here and
-{"error": WHY} for what failed. It ends when its input does.
+MAKE is a function below that prepares the row and returns its `chunk`: it goes on for some steps
+and says how many it made. The last line that is printed is JSON, of the steps and the seconds.
 """
 
+# pyright: reportMissingImports=false
 import importlib
+import itertools
 import json
 import os
-import signal
 import sys
 import time
-from collections.abc import Mapping
-from importlib import metadata
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
-from typing import Any, TextIO
+from typing import Any
 
-ROOT = Path(__file__).resolve().parents[2]
+import numpy as np
 
+Chunk = Callable[[], int]
 
-def main(name: str) -> None:
-    """Serve the rows of a module until the input ends."""
-    # Ctrl-C is for the process that started this one.
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    # What a library prints is no answer: it goes where errors go.
-    answers = os.fdopen(os.dup(1), "w", encoding="utf-8")
-    os.dup2(2, 1)
-    sys.path.insert(0, str(ROOT))
-    from benchmarks.speed.loops import Missing, Prepared
+ACTIONS, BATCHES = 256, 16
+"""Actions of one environment, and batches of actions, drawn beforehand and used over and over."""
 
-    def say(answer: Mapping[str, Any]) -> None:
-        print(json.dumps(answer), file=answers, flush=True)
-
-    try:
-        module = importlib.import_module(name)
-    except Exception as error:
-        say({"error": in_words(error)})
-        return
-    say({"ready": True, "versions": versions(getattr(module, "PACKAGES", ()))})
-    prepared: dict[str, Prepared] = {}
-    for request in requests(sys.stdin):
-        try:
-            if "prepare" in request:
-                begin = time.perf_counter()
-                prepared[request["prepare"]] = module.ROWS[request["row"]](**request["settings"])
-                prepared[request["prepare"]].chunk()
-                say({"prepared": time.perf_counter() - begin})
-            else:
-                say(measured(prepared[request["measure"]], request["seconds"]))
-        except Missing as reason:
-            say({"missing": str(reason)})
-        except Exception as error:
-            say({"error": in_words(error)})
+PERIOD_S, PRESSURE_PA = 0.01, 350e3
+"""How long a command of the plant alone is held, and the gauge pressure of its trial."""
 
 
-def measured(row: Any, seconds: float) -> dict[str, Any]:  # noqa: ANN401 - a Prepared
-    """Steps in a time (s), in whole chunks; how long they took, and the row's facts."""
-    steps, begin = 0, time.perf_counter()
-    while True:
-        steps += row.chunk()
-        elapsed = time.perf_counter() - begin
-        if elapsed >= seconds:
-            return {"steps": steps, "seconds": elapsed, "facts": dict(row.facts())}
+def measured(chunk: Chunk, seconds: float) -> tuple[int, float]:
+    """Steps in a time (s), in whole chunks after a first that does not count, and how long."""
+    chunk()
+    steps, start = 0, time.perf_counter()
+    while (elapsed := time.perf_counter() - start) < seconds or not steps:
+        steps += chunk()
+    return steps, elapsed
 
 
-def requests(lines: TextIO) -> Any:  # noqa: ANN401 - an iterator of what JSON holds
-    """Parse requests from lines of an input."""
-    for line in lines:
-        yield json.loads(line)
+def single(environment: Any, actions: Sequence[Any]) -> Chunk:  # noqa: ANN401
+    """Steps of one Gymnasium environment; what its resets take counts too."""
+    step, reset = environment.step, environment.reset
+    reset(seed=0)
+
+    def chunk() -> int:
+        for action in actions:
+            _, _, terminated, truncated, _ = step(action)
+            if terminated or truncated:
+                reset()
+        return len(actions)
+
+    return chunk
 
 
-def versions(packages: tuple[str, ...]) -> dict[str, str]:
-    """Versions of Python and of installed packages."""
-    return {"python": sys.version.split()[0]} | {name: metadata.version(name) for name in packages}
+def many(environment: Any, batches: Iterable[Any], count: int) -> Chunk:  # noqa: ANN401
+    """Steps of a vector environment that resets its environments itself."""
+    step, following = environment.step, itertools.cycle(batches)
+    environment.reset()
+    rounds = max(1, 1024 // count)
+
+    def chunk() -> int:
+        for _ in range(rounds):
+            step(next(following))
+        return rounds * count
+
+    return chunk
 
 
-def in_words(error: BaseException) -> str:
-    """An error on one line."""
-    text = " ".join(str(error).split())
-    return f"{type(error).__name__}: {text}" if text else type(error).__name__
+def sampled(environment: Any, count: int) -> list[Any]:  # noqa: ANN401
+    """Actions of an environment's space."""
+    environment.action_space.seed(0)
+    return [environment.action_space.sample() for _ in range(count)]
+
+
+def one(name: str, library: str = "gymnasium") -> Chunk:
+    """An environment as its library's `make` gives it."""
+    environment = importlib.import_module(library).make(name)
+    return single(environment, sampled(environment, ACTIONS))
+
+
+def vector(name: str, count: int, mode: str = "vector_entry_point", **options: Any) -> Chunk:
+    """Many of them as `gym.make_vec` gives them: as one array, or one after the other."""
+    import gymnasium as gym
+
+    environment = gym.make_vec(name, num_envs=count, vectorization_mode=mode, **options)
+    return many(environment, sampled(environment, BATCHES), count)
+
+
+def dm_control() -> Chunk:
+    """A task of DeepMind's control suite, begun anew when its episode ends."""
+    # Nothing is drawn, and the machine may have no screen.
+    os.environ.setdefault("MUJOCO_GL", "disabled")
+    from dm_control import suite
+
+    environment = suite.load("pendulum", "swingup", task_kwargs={"random": 0})
+    limits = environment.action_spec()
+    shape = (ACTIONS, *limits.shape)
+    actions = np.random.default_rng(0).uniform(limits.minimum, limits.maximum, shape)
+    environment.reset()
+
+    def chunk() -> int:
+        for action in actions:
+            if environment.step(action).last():
+                environment.reset()
+        return len(actions)
+
+    return chunk
+
+
+def reactor() -> Chunk:
+    """PC-gym's stirred tank reactor as its documentation sets it up: minutes, mol/l, K."""
+    from pcgym import make_env
+
+    environment = make_env(
+        {
+            "model": "cstr",
+            "integration_method": "casadi",
+            "N": 120,
+            "tsim": 26,
+            "SP": {"Ca": [0.85] * 60 + [0.9] * 60},
+            "o_space": {"low": np.array([0.7, 300, 0.8]), "high": np.array([1.0, 350, 0.9])},
+            "a_space": {"low": np.array([295.0]), "high": np.array([302.0])},
+            "x0": np.array([0.8, 330.0, 0.8]),
+        }
+    )
+    return single(environment, list(np.random.default_rng(0).uniform(-1.0, 1.0, (ACTIONS, 1))))
+
+
+def envpool(name: str, count: int) -> Chunk:
+    """EnvPool's batch on one thread, kept with Python's on one processor, where it is fastest."""
+    import envpool as library
+
+    _keep_one_processor()
+    environment = library.make(
+        name, env_type="gymnasium", num_envs=count, batch_size=count, num_threads=1, seed=0
+    )
+    space, generator = environment.action_space, np.random.default_rng(0)
+    if hasattr(space, "n"):
+        batches = generator.integers(space.n, size=(BATCHES, count), dtype=np.int32)
+    else:
+        shape = (BATCHES, count, *space.shape)
+        batches = generator.uniform(space.low, space.high, shape).astype(np.float32)
+    return many(environment, batches, count)
+
+
+def gymnax(name: str, count: int) -> Chunk:
+    """A compiled loop in JAX over steps that reset what has ended, on one thread."""
+    _keep_one_processor()
+    import gymnax as library
+    import jax
+
+    jax.config.update("jax_default_prng_impl", "unsafe_rbg")
+    environment, parameters = library.make(name)
+    length = min(1000, max(4, (1 << 20) // count))
+    keys = jax.random.split(jax.random.key(0), (length, count))
+    actions = jax.vmap(jax.vmap(environment.action_space(parameters).sample))(keys)
+    _, state = jax.vmap(environment.reset, (0, None))(keys[0], parameters)
+    stepped = jax.vmap(environment.step, (0, 0, 0, None))
+
+    @jax.jit
+    def run(state, keys, actions):  # noqa: ANN001, ANN202 - JAX's own trees
+        def one(state, inputs):  # noqa: ANN001, ANN202
+            key, action = inputs
+            observation, state, reward, *ends, _ = stepped(key, state, action, parameters)
+            return state, (observation, reward, ends)
+
+        return jax.lax.scan(one, state, (keys, actions))
+
+    def chunk() -> int:
+        nonlocal state
+        state, seen = run(state, keys, actions)
+        jax.block_until_ready(seen)
+        return length * count
+
+    return chunk
+
+
+def _keep_one_processor() -> None:
+    """Threads share one processor, where the system lets a program choose."""
+    if sys.platform == "linux":
+        os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})
+
+
+def _trial(integrate: Callable[[Any, float], Any]) -> Chunk:
+    """Steps of an integrator on pma-gym's plant under random voltages (V), each held."""
+    _, rest = _plant()
+    voltages = np.random.default_rng(0).uniform(0.0, 10.0, 500).tolist()
+
+    def chunk() -> int:
+        state = rest.state
+        for motor in voltages:
+            state = integrate(state, motor)
+        return len(voltages)
+
+    return chunk
+
+
+def _plant() -> tuple[Any, Any]:
+    from pma_gym.plant.plant import Plant
+
+    plant = Plant("station")
+    return plant, plant.settle(0.0, PRESSURE_PA)
+
+
+def solve_ivp(method: str, rtol: float) -> Chunk:
+    """Scipy's integrators, called for every control step; the right-hand side is compiled."""
+    import scipy.integrate
+
+    plant, rest = _plant()
+    regulator, zero = plant.regulator_voltage(PRESSURE_PA), rest.zero_contraction
+
+    def integrate(state: Any, motor: float) -> Any:  # noqa: ANN401
+        return scipy.integrate.solve_ivp(
+            lambda _, y: plant.derivative(y, motor, regulator, zero),
+            (0.0, PERIOD_S),
+            state,
+            method,
+            rtol=rtol,
+            atol=1e-3 * rtol,
+        ).y[:, -1]
+
+    return _trial(integrate)
+
+
+def do_mpc() -> Chunk:
+    """do-mpc's simulator, its laws as CasADi expressions of the same text."""
+    import do_mpc as library
+
+    model = library.model.Model("continuous", "SX")
+    states = {name: model.set_variable("_x", name) for name in _plant()[0].states}
+    motor = model.set_variable("_u", "motor_voltage")
+    for name, rate in zip(states, _rates(states, motor), strict=True):
+        model.set_rhs(name, rate)
+    model.setup()
+    made = library.simulator.Simulator(model)
+    made.set_param(t_step=PERIOD_S, integration_tool="cvodes", reltol=1e-6, abstol=1e-9)
+    made.setup()
+
+    def integrate(state: Any, motor: float) -> Any:  # noqa: ANN401
+        made.x0 = state
+        # What it records of every step is copied whole in every step.
+        made.reset_history()
+        made.make_step(np.array([[motor]]))
+        return np.asarray(made.x0.cat).ravel()
+
+    return _trial(integrate)
+
+
+def _rates(states: dict[str, Any], motor: Any) -> list[Any]:  # noqa: ANN401 - CasADi's symbols
+    """The rate of every state of the station, for symbols of state and voltage (V)."""
+    import operator
+
+    import casadi
+
+    from pma_gym.codegen.trace import order
+    from pma_gym.plant.program import parameter_names
+
+    plant, rest = _plant()
+    known: dict[str, Any] = {**states, "motor_voltage": motor}
+    known |= zip(parameter_names(plant.model), plant.model.vector().tolist(), strict=True)
+    known["regulator_voltage"] = plant.regulator_voltage(PRESSURE_PA)
+    known["zero_contraction"] = rest.zero_contraction
+    operations: dict[str, Callable[..., Any]] = {
+        "add": operator.add,
+        "subtract": operator.sub,
+        "multiply": operator.mul,
+        "divide": operator.truediv,
+        "negative": operator.neg,
+        "absolute": casadi.fabs,
+        "square_root": casadi.sqrt,
+        "floor": casadi.floor,
+        "less": operator.lt,
+        "less_equal": operator.le,
+        "equal": operator.eq,
+        "not_equal": operator.ne,
+        "and": casadi.logic_and,
+        "or": casadi.logic_or,
+        "not": casadi.logic_not,
+        "select": casadi.if_else,
+    }
+    rates, made = plant.program.rates(), {}
+    for value in order(rates):
+        if value.operands:
+            parts = [made[part.id] for part in value.operands]
+            made[value.id] = operations[value.operation](*parts)
+        else:
+            made[value.id] = value.data if value.is_constant else known[value.data]
+    return [made[value.id] for value in rates]
+
+
+def _ppo(name: str, count: int, **options: Any) -> Any:  # noqa: ANN401 - a PPO
+    """PPO that has learned nothing yet: docs/batches.md's on this package's batch, else SB3's."""
+    from stable_baselines3 import PPO
+    from stable_baselines3.common.env_util import make_vec_env
+
+    from pma_gym.sb3 import LeanPPO, SB3VecEnv
+
+    options |= {"seed": 0, "device": "cpu"}
+    if not name.startswith("pma_gym/"):
+        return PPO("MlpPolicy", make_vec_env(name, count, seed=0), **options)
+    # PyTorch's Adam in one pass; eps is Stable-Baselines3's own.
+    adam = {"optimizer_kwargs": {"fused": True, "eps": 1e-5}}
+    return LeanPPO("MlpPolicy", SB3VecEnv(count, name), policy_kwargs=adam, **options)
+
+
+def rollouts(name: str, count: int, **options: Any) -> Chunk:
+    """PPO's rollouts without its learning: environments, policy, buffer, advantages."""
+    import torch
+
+    torch.set_num_threads(1)
+    model = _ppo(name, count, **options)
+    _, callback = model._setup_learn(total_timesteps=1 << 40)
+
+    def chunk() -> int:
+        model.collect_rollouts(model.env, callback, model.rollout_buffer, model.n_steps)
+        return model.n_steps * count
+
+    return chunk
+
+
+def learning(name: str, count: int, threads: int = 1, **options: Any) -> Chunk:
+    """PPO from end to end, a rollout and what is learned from it at a time."""
+    import torch
+
+    torch.set_num_threads(threads)
+    model = _ppo(name, count, **options)
+
+    def chunk() -> int:
+        model.learn(total_timesteps=model.n_steps * count, reset_num_timesteps=False)
+        return model.n_steps * count
+
+    return chunk
 
 
 if __name__ == "__main__":
-    main(sys.argv[1])
+    # Where this project is not installed, its own rows are not asked for.
+    sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
+    make, settings, seconds = sys.argv[1:]
+    asked = json.loads(settings)
+    if str(asked.get("name", "")).startswith("pma_gym/"):
+        import pma_gym  # noqa: F401 - registers the environments
+    steps, elapsed = measured(globals()[make](**asked), float(seconds))
+    print("\n" + json.dumps({"steps": steps, "seconds": elapsed}))

@@ -1,26 +1,24 @@
-"""Checkpoints of a training: tensors and numbers, written whole or not at all.
+"""Checkpoints of a training: parameters as Stable-Baselines3 saves them, arrays, JSON.
 
-Nothing in them executes when it is loaded: weights, optimisers' states and replayed transitions
-travel as safetensors, counts as JSON.
+Nothing in them executes when it is loaded: of the zip no pickled data is written or read, and
+tensors are read as weights only.
 """
 
 import json
 import re
 import shutil
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import torch
-from safetensors import SafetensorError
-from safetensors.torch import load_file, save_file
 from stable_baselines3.common.base_class import BaseAlgorithm
+from stable_baselines3.common.save_util import load_from_zip_file, save_to_zip_file
 
 from benchmarks.runner.damaged_results import reason, say_damaged
 from benchmarks.training.averaging import WeightAverage
-from controllers.policies.tensor_header import LARGEST_HEADER, check_header
 from pma_gym.document_shape import check_shape
 from pma_gym.documents import read_json
 from pma_gym.limits import check_limit
@@ -28,6 +26,9 @@ from pma_gym.partials import begin_partial, clean_folder, end_partial
 
 COUNTERS = ("num_timesteps", "_n_updates", "_episode_num")
 """What a model counts."""
+
+REPLAYED = ("observations", "next_observations", "actions", "rewards", "dones", "timeouts")
+"""Arrays of the replayed transitions."""
 
 
 class CheckpointError(RuntimeError):
@@ -41,7 +42,7 @@ def save_checkpoint(
     average: WeightAverage | None,
     content: Mapping[str, Any],
 ) -> None:
-    """Save all that the next leg of a training depends on; the last one stays until this is whole.
+    """Save all that the next leg of a training depends on; the last one stays beside it.
 
     Args:
         folder: of the checkpoints.
@@ -54,71 +55,110 @@ def save_checkpoint(
     """
     folder.mkdir(parents=True, exist_ok=True)
     final = folder / f"{number:06d}"
-    # What a killed training left half-written goes too.
-    partial, replaced = begin_partial(final), begin_partial(final)
+    partial = begin_partial(final)
     try:
         partial.mkdir()
-        tensors, numbers = _state(model)
+        variables = {name: getattr(model, name).data for name in _variables(model)}
         if average is not None:
-            # The last rollout of a leg is averaged when the next leg begins.
-            numbers["averaged_at"] = average.seen
-            tensors |= {f"average.{i}": one for i, one in enumerate(average.weights or ())}
-        save_file(
-            {key: one.contiguous().clone() for key, one in tensors.items()},
-            partial / "state.safetensors",
-        )
-        state = json.dumps({"numbers": numbers, "told": dict(content)}, indent=1)
+            variables |= {f"average.{i}": one for i, one in enumerate(average.weights or ())}
+        with (partial / "model.zip").open("wb") as file:
+            save_to_zip_file(file, None, model.get_parameters(), variables)
+        buffer, counters = getattr(model, "replay_buffer", None), _counters(model)
+        if buffer is not None:
+            counters["replayed"] = [int(buffer.pos), bool(buffer.full)]
+            rows = len(buffer.rewards) if buffer.full else buffer.pos
+            np.savez(partial / "replay.npz", **{k: getattr(buffer, k)[:rows] for k in REPLAYED})
+        # The last rollout of a leg is averaged when the next leg begins.
+        counters["averaged_at"] = average.seen if average is not None else 0
+        state = json.dumps({**content, "counters": counters}, indent=1)
         (partial / "state.json").write_text(state, encoding="utf-8")
         if final.exists():
-            # Whole under another name until the new one is there: a kill may come between.
-            final.rename(replaced)
+            shutil.rmtree(final)
         partial.rename(final)
-    # What fails while tensors are written is no OSError.
-    except (OSError, SafetensorError) as error:
-        kept = latest(folder)
-        why = getattr(error, "strerror", None) or error
-        stays = f"the one of leg {kept[0]} stays in {kept[1]}" if kept else "there is none before"
+    # PyTorch says of a full disk that it is no OSError.
+    except (OSError, RuntimeError) as error:
         raise CheckpointError(
-            f"checkpoint {number} cannot be saved in {folder}: {why}; {stays}; "
-            "make room or allow writing, then run the same command again: it goes on from there"
+            f"checkpoint {number} cannot be saved in {folder}: {error}; those before it stay; make "
+            "room or allow writing, then run the same command again: it goes on from there"
         ) from error
     finally:
-        for name in (partial, replaced):
-            with suppress(OSError):
-                end_partial(name)
+        with suppress(OSError):
+            end_partial(partial)
     for old in _numbered(folder)[:-2]:
         shutil.rmtree(old, ignore_errors=True)
 
 
-def latest(folder: Path) -> tuple[int, Path] | None:
-    """Number and folder of the newest checkpoint, if there is one.
-
-    What a killed training left half-written beside them is removed.
-    """
-    clean_folder(folder)
-    checkpoints = [path for path in _numbered(folder) if (path / "state.json").is_file()]
-    return (int(checkpoints[-1].name), checkpoints[-1]) if checkpoints else None
-
-
-def usable(folder: Path, keys: Mapping[str, Any]) -> tuple[int, Path, dict[str, Any]] | None:
-    """The newest checkpoint that is not damaged, and what it says besides its tensors.
+def load_checkpoint(
+    folder: Path,
+    model: BaseAlgorithm,
+    average: WeightAverage | None,
+    shape: Mapping[str, Any],
+    order: Mapping[str, Any],
+) -> tuple[int, dict[str, Any]] | None:
+    """Put a model where the newest checkpoint that is not damaged was.
 
     Args:
         folder: of the checkpoints.
-        keys: shapes of what there must be, by key.
+        model: a new one.
+        average: its averaged weights.
+        shape: of what `save_checkpoint` was to remember.
+        order: what is trained; that of the checkpoint must be the same.
+    Returns:
+        Number of legs that are done, and what was remembered; None without a checkpoint.
+    Raises:
+        CheckpointError: the folder is another training's.
     """
+    clean_folder(folder)
     for path in reversed(_numbered(folder)):
-        if not (path / "state.json").is_file():
-            continue
         try:
-            content = read_content(path, keys)
-            check_shape(content, keys)
-            _check_tensors(path / "state.safetensors")
-        except (CheckpointError, OSError, ValueError) as error:
-            say_damaged(path, reason(error.__cause__ or error), "the one before it serves, if any")
+            content = read_json(path / "state.json", "journal_mib", own=True, finite=False)
+            check_shape(content, {**shape, "order": dict, "counters": dict})
+            _check_same(path, content["order"], order)
+            for name in ("model.zip", "replay.npz"):
+                if (path / name).exists():
+                    size = (path / name).stat().st_size
+                    check_limit(str(path / name), "weights_mib", size / 2**20)
+            _restore(model, average, path, content.pop("counters"))
+        except CheckpointError:
+            raise
+        except Exception as error:
+            say_damaged(path, reason(error), "the one before it serves, if any")
             continue
-        return int(path.name), path, content
+        return int(path.name), content
     return None
+
+
+def _check_same(path: Path, old: Mapping[str, Any], new: Mapping[str, Any]) -> None:
+    new = json.loads(json.dumps(new))
+    other = [key for key in {**old, **new} if old.get(key) != new.get(key)]
+    if other:
+        words = "; ".join(f"{key} was {old.get(key)!r}, is {new.get(key)!r}" for key in other)
+        raise CheckpointError(
+            f"{path} is of another training: {words}; give another --out, or delete that folder"
+        )
+
+
+def _restore(
+    model: BaseAlgorithm, average: WeightAverage | None, path: Path, counters: dict[str, Any]
+) -> None:
+    _, parameters, variables = load_from_zip_file(path / "model.zip", load_data=False)
+    tensors = variables or {}
+    means = [tensors[f"average.{i}"] for i in range(sum(k.startswith("average.") for k in tensors))]
+    if not all(torch.isfinite(one).all() for one in parameters["policy"].values()):
+        raise ValueError("weights hold NaN or infinity: the training diverged")
+    model.set_parameters(parameters, exact_match=True)
+    for name in _variables(model):
+        getattr(model, name).data.copy_(tensors[name])
+    if average is not None:
+        average.weights, average.seen = means or None, int(counters["averaged_at"])
+    buffer: Any = getattr(model, "replay_buffer", None)
+    if buffer is not None:
+        with np.load(path / "replay.npz", allow_pickle=False) as replayed:
+            for name in REPLAYED:
+                getattr(buffer, name)[: len(replayed[name])] = replayed[name]
+        buffer.pos, buffer.full = counters["replayed"]
+    for name in _counters(model):
+        setattr(model, name, counters[name])
 
 
 def _numbered(folder: Path) -> list[Path]:
@@ -126,129 +166,10 @@ def _numbered(folder: Path) -> list[Path]:
     return sorted(path for path in folder.glob("*") if re.fullmatch("[0-9]{6}", path.name))
 
 
-def read_content(path: Path, keys: Collection[str]) -> dict[str, Any]:
-    """Read the content of a checkpoint besides its tensors.
-
-    Args:
-        path: of the checkpoint.
-        keys: what there must be.
-    Raises:
-        CheckpointError: it is damaged.
-    """
-    try:
-        content = _words(path)["told"]
-        return {key: content[key] for key in keys}
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        raise _damaged(path, error) from error
-
-
-def load_checkpoint(path: Path, model: BaseAlgorithm, average: WeightAverage | None) -> None:
-    """Put a model where a checkpoint was.
-
-    Raises:
-        CheckpointError: it is damaged, or of another model.
-    """
-    try:
-        _check_tensors(path / "state.safetensors")
-        tensors = load_file(path / "state.safetensors")
-        numbers = _words(path)["numbers"]
-        _check_finite(tensors)
-        _restore(model, tensors, numbers)
-        means = [
-            tensors[f"average.{i}"] for i in range(sum(k.startswith("average.") for k in tensors))
-        ]
-        if average is not None and means:
-            average.weights = means
-        if average is not None:
-            average.seen = int(numbers["averaged_at"])
-    except Exception as error:
-        raise _damaged(path, error) from error
-
-
-def _words(path: Path) -> dict[str, Any]:
-    """What a checkpoint says besides its tensors; a training that diverged may hold NaN."""
-    return read_json(path / "state.json", "journal_mib", own=True, finite=False)
-
-
-def _check_tensors(path: Path) -> None:
-    """Refuse a file of tensors that announces more than it holds, before memory is taken."""
-    size = path.stat().st_size
-    check_limit(str(path), "weights_mib", size / 2**20)
-    with path.open("rb") as file:
-        check_header(file.read(8 + LARGEST_HEADER), size)
-
-
-def _check_finite(tensors: Mapping[str, torch.Tensor]) -> None:
-    for name, tensor in tensors.items():
-        if not torch.isfinite(tensor).all():
-            raise ValueError(f"tensor {name} holds NaN or infinity: the training diverged")
-
-
-def _damaged(path: Path, error: Exception) -> CheckpointError:
-    return CheckpointError(
-        f"checkpoint {path} cannot be used ({type(error).__name__}: {error}); delete that folder "
-        "to go on from the one before"
-    )
-
-
-def _state(model: BaseAlgorithm) -> tuple[dict[str, torch.Tensor], dict[str, Any]]:
-    """All that a model has learned and counts, as tensors and JSON."""
-    tensors: dict[str, torch.Tensor] = {}
-    numbers: dict[str, Any] = {
-        "counters": {n: getattr(model, n) for n in COUNTERS if hasattr(model, n)}
-    }
-    for name, state in model.get_parameters().items():
-        if "optimizer" in name:
-            numbers[name] = state["param_groups"]
-            for i, values in state["state"].items():
-                tensors |= {f"{name}.{i}.{key}": value for key, value in values.items()}
-        else:
-            tensors |= {f"{name}.{key}": value for key, value in state.items()}
-    for name in _variables(model):
-        tensors[f"variable.{name}"] = getattr(model, name).data
-    buffer = getattr(model, "replay_buffer", None)
-    if buffer is not None:
-        numbers["replayed"] = [int(buffer.pos), bool(buffer.full)]
-        for name in _replayed(buffer):
-            kept = getattr(buffer, name)
-            tensors[f"replayed.{name}"] = torch.from_numpy(
-                kept if buffer.full else kept[: buffer.pos]
-            )
-    return tensors, numbers
+def _counters(model: BaseAlgorithm) -> dict[str, Any]:
+    return {name: getattr(model, name) for name in COUNTERS if hasattr(model, name)}
 
 
 def _variables(model: BaseAlgorithm) -> list[str]:
     """Names of the tensors that a model learns outside its networks (SAC's temperature)."""
     return [name for name in ("log_ent_coef",) if getattr(model, name, None) is not None]
-
-
-def _replayed(buffer: Any) -> list[str]:  # noqa: ANN401
-    names = ("observations", "next_observations", "actions", "rewards", "dones", "timeouts")
-    return [name for name in names if isinstance(getattr(buffer, name, None), np.ndarray)]
-
-
-def _restore(
-    model: BaseAlgorithm, tensors: dict[str, torch.Tensor], numbers: dict[str, Any]
-) -> None:
-    states: dict[str, Any] = {}
-    for name, state in model.get_parameters().items():
-        if "optimizer" not in name:
-            states[name] = {key: tensors[f"{name}.{key}"] for key in state}
-            continue
-        values: dict[int, dict[str, torch.Tensor]] = {}
-        for key, tensor in tensors.items():
-            if key.startswith(f"{name}."):
-                index, _, what = key.removeprefix(f"{name}.").partition(".")
-                values.setdefault(int(index), {})[what] = tensor
-        states[name] = {"state": values, "param_groups": numbers[name]}
-    model.set_parameters(states, exact_match=True)
-    for name in _variables(model):
-        getattr(model, name).data.copy_(tensors[f"variable.{name}"])
-    for name, value in numbers["counters"].items():
-        setattr(model, name, value)
-    if "replayed" in numbers:
-        buffer: Any = model.replay_buffer  # type: ignore[attr-defined]
-        buffer.pos, buffer.full = numbers["replayed"]
-        for name in _replayed(buffer):
-            kept = tensors[f"replayed.{name}"].numpy()
-            getattr(buffer, name)[: len(kept)] = kept

@@ -15,13 +15,13 @@ from rich.progress import (
 )
 
 from benchmarks.executors.executor import Executor, run_or_raise
+from benchmarks.training.card import save_policy
 from benchmarks.training.configuration.preset import Preset, PresetError, load_preset
 from benchmarks.training.policy_export.product import policy_name, policy_of
 from benchmarks.training.run import Order, Point, Trained, train
 from benchmarks.training.validation import unit_of
 from controllers.design.designs import kind_of
 from controllers.policies.adapter import base_of
-from controllers.policies.policy_file import save_policy_file
 from pma_gym.envs import ENVIRONMENTS
 from pma_gym.tasks import EXERCISES, named_task
 
@@ -88,13 +88,14 @@ def _environment_of(task: str) -> tuple[str, dict[str, str]]:
     return EXERCISE, {"task": name}
 
 
-def run_train(order: Order, out: Path, console: Console) -> Path:
+def run_train(order: Order, out: Path, console: Console, ship: bool = False) -> Path:
     """Train, and write the policy.
 
     Args:
         order: what is to be trained.
         out: folder of the policy, its checkpoints and logs.
         console: where progress is shown.
+        ship: write the policy where the package's lie too.
     Returns:
         The policy's .json file.
     Raises:
@@ -118,7 +119,7 @@ def run_train(order: Order, out: Path, console: Console) -> Path:
                 progress.console.print(_line(point, unit))
 
         trained = train(order, out, on_progress)
-    path = save_policy_file(policy_of(order, trained), out / policy_name(order.preset))
+    path = save_policy(policy_of(order, trained), out, ship)
     console.print(_closing(trained, unit, path))
     return path
 
@@ -152,7 +153,7 @@ def _trained(order: Order, out: Path) -> tuple[Path, str]:
     """Train without a display; the policy's file and a line on it."""
     out.mkdir(parents=True, exist_ok=True)
     trained = train(order, out, lambda steps, point: None)
-    path = save_policy_file(policy_of(order, trained), out / policy_name(order.preset))
+    path = save_policy(policy_of(order, trained), out)
     return path, _closing(trained, unit_of(order.preset.task), path)
 
 

@@ -4,10 +4,8 @@ Every leg begins with fresh episodes and seeds of its own, made from the trainin
 leg's number. So a training that was killed goes on from its last checkpoint to the same result.
 """
 
-import json
-import math
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from contextlib import closing
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -21,12 +19,7 @@ from stable_baselines3.common.logger import configure
 from stable_baselines3.common.utils import set_random_seed
 
 from benchmarks.training.averaging import WeightAverage, averaged, set_weights
-from benchmarks.training.checkpoint import (
-    CheckpointError,
-    load_checkpoint,
-    save_checkpoint,
-    usable,
-)
+from benchmarks.training.checkpoint import load_checkpoint, save_checkpoint
 from benchmarks.training.configuration.preset import Preset
 from benchmarks.training.environments import (
     drawing_s,
@@ -59,7 +52,7 @@ class Point(NamedTuple):
         error: of the validation (mm or deg).
         broken: validation episodes that broke a limit.
         reward: mean reward of a validation episode.
-        mean: mean error of all validation episodes (mm or deg); NaN in checkpoints without it.
+        mean: mean error of all validation episodes (mm or deg).
     """
 
     steps: int
@@ -67,7 +60,7 @@ class Point(NamedTuple):
     error: float
     broken: int
     reward: float
-    mean: float = math.nan
+    mean: float
 
 
 @dataclass(frozen=True)
@@ -198,8 +191,7 @@ def _formats() -> list[str]:
 
 
 _CONTENT = {
-    "order": dict,
-    "curve": ListOf(ListOf(Real(finite=False), 5)),
+    "curve": ListOf(ListOf(Real(finite=False), len(Point._fields))),
     "wall_s": Real(),
     "learning_s": Real(),
     "stopped": bool,
@@ -211,25 +203,12 @@ def _resumed(
     order: Order, out: Path, model: BaseAlgorithm, average: WeightAverage | None
 ) -> Course:
     """Where the training stands, with the model put there."""
-    checkpoint = usable(out / "checkpoints", _CONTENT)
-    if checkpoint is None:
+    loaded = load_checkpoint(out / "checkpoints", model, average, _CONTENT, order.to_json())
+    if loaded is None:
         return Course()
-    number, path, content = checkpoint
-    here = json.loads(json.dumps(order.to_json()))
-    if content["order"] != here:
-        raise CheckpointError(
-            f"{path} is of another training: {_differences(content['order'], here)}; give another "
-            "--out, or delete that folder"
-        )
-    load_checkpoint(path, model, average)
-    curve = [Point(*point[: len(Point._fields)]) for point in content["curve"]]
-    times = content["wall_s"], content["learning_s"]
-    return Course(curve, number, *times, content["stopped"])
-
-
-def _differences(old: Mapping[str, Any], new: Mapping[str, Any]) -> str:
-    keys = [key for key in {**old, **new} if old.get(key) != new.get(key)]
-    return "; ".join(f"{key} was {old.get(key)!r}, is {new.get(key)!r}" for key in keys)
+    legs, content = loaded
+    curve = [Point(*point) for point in content["curve"]]
+    return Course(curve, legs, content["wall_s"], content["learning_s"], content["stopped"])
 
 
 def _as_json(course: Course) -> dict[str, Any]:

@@ -45,14 +45,7 @@ from generators.hidden_effects import (
     hidden_summary,
 )
 from generators.models import differences, identification, misfit, parameters, shipped
-from generators.policies import (
-    policies_ablations,
-    policies_judged,
-    policies_operators,
-    policies_robustness,
-    policies_shipped,
-    policies_trained,
-)
+from generators.policies import policies_shipped
 from generators.source import misprints, rates, verdicts, wrong_in_print
 from generators.suite import controllers, example, targets, trials, tuning
 from generators.suites import episode_plans, occasional, suites
@@ -70,8 +63,7 @@ GENERATORS: dict[str, Callable[..., str]] = {
         *(hidden_rates, hidden_cases, hidden_sizes, hidden_rounds, hidden_misses),
         *(hidden_baselines, hidden_bound, hidden_kinds, hidden_parameters, hidden_seconds),
         *(hidden_confused, hidden_summary),
-        *(policies_shipped, policies_judged, policies_trained),
-        *(policies_ablations, policies_robustness, policies_operators),
+        policies_shipped,
         *(exercise_check, exercise_worst, exercise_ranges, exercise_knee, exercise_makers),
         *(exercise_people, exercise_safety, exercise_safety_text),
     )

@@ -116,8 +116,7 @@ class Preset:
             "settings": dict(self.settings),
             "network": dict(self.network),
             "noise_std": self.noise_std,
-            # Trainings from before there was one go on.
-            **({"reward_scale": self.reward_scale} if self.reward_scale != 1.0 else {}),
+            "reward_scale": self.reward_scale,
         }
 
 

@@ -20,9 +20,7 @@ from benchmarks.training.policy_export.product import policy_name, policy_of
 from benchmarks.training.reward import BROKEN_REWARD, LEAST_REWARD, bounded
 from benchmarks.training.run import Order, train
 from benchmarks.training.stations import Stations
-from benchmarks.training.study.operators import SEED, figures_of, table_of
 from benchmarks.training.validation import measure_of
-from controllers import ConstantPressure
 from controllers.policies.action_mapping import ActionMapping
 from controllers.policies.observation_spec import ObservationSpec
 from controllers.policies.policy_file import load_policy_file, save_policy_file
@@ -118,12 +116,6 @@ def test_rewards_are_bounded_before_they_are_scaled():
     assert bounded(-1e4, True) == BROKEN_REWARD
 
 
-def test_a_scale_must_be_positive_and_leaves_older_trainings_theirs(preset):
-    small = preset()
-    assert "reward_scale" not in small.to_json()
-    assert small.changed(reward_scale=0.01).to_json()["reward_scale"] == 0.01
-
-
 # -- stations --------------------------------------------------------------------------------------
 
 
@@ -151,30 +143,6 @@ def test_operators_differ_from_seed_to_seed():
     envs.close()
 
 
-# -- judged ----------------------------------------------------------------------------------------
-
-
-def test_operators_judge_a_controller_on_both_kinds_of_station():
-    figures = figures_of(["constant_pressure"], 2, "isokinetic_exercise")
-    assert [row["stations"] for row in figures["rows"]] == ["nominal", "drawn"]
-    env = PMAEnv("isokinetic_exercise")
-    errors = [driven(env, ConstantPressure(), seed) for seed in (SEED, SEED + 1)]
-    np.testing.assert_allclose(figures["rows"][0]["rmse"], np.mean(errors, axis=0), atol=1e-4)
-    table = table_of(figures)
-    assert table[0] == "| Controller | Stations | I (deg) | II (deg) | III (deg) | Ended |"
-    assert table[2].startswith("| constant_pressure | nominal | ") and len(table) == 4
-
-
-def driven(env, controller, seed):
-    """RMSE by phase (deg) of one operator's trial."""
-    env.reset(seed=seed)
-    controller.reset(env.reference, env.station)
-    ended = False
-    while not ended:
-        *_, ended, info = env.step(env.action(controller.act(env.measurement, env.time)))
-    return list(info["rmse_by_phase_deg"].values())
-
-
 def test_the_card_of_an_exercise_says_what_moves_and_how_it_is_made_again():
     (path,) = [path for path in shipped_policies() if path.stem == "isokinetic-100hz-ppo"]
     policy = load_policy_file(path)
@@ -185,4 +153,3 @@ def test_the_card_of_an_exercise_says_what_moves_and_how_it_is_made_again():
     made = ordered("ppo", command[1], command[2], 0, None, "cpu", 1, 0).preset
     assert (made.view, made.form) == (policy.view, policy.form)
     assert policy_name(made) == policy.name
-    assert all(line in words for line in table_of(policy.training["scores"]["operators"]))

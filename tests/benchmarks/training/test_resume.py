@@ -1,12 +1,16 @@
 """A training that was interrupted goes on to what it would have come to, or says why not."""
 
+import base64
 import errno
 import hashlib
+import io
+import json
 import os
 import resource
 import shutil
 import subprocess
 import sys
+import zipfile
 
 import pytest
 
@@ -14,12 +18,13 @@ pytest.importorskip("stable_baselines3")
 pytest.importorskip("sb3_contrib")
 pytest.importorskip("safetensors")
 
+import cloudpickle
 import torch
-from safetensors.torch import load_file
+from stable_baselines3.common.save_util import load_from_zip_file
 
 from benchmarks.training import checkpoint, run
 from benchmarks.training.averaging import WeightAverage
-from benchmarks.training.checkpoint import CheckpointError, latest, save_checkpoint
+from benchmarks.training.checkpoint import CheckpointError, save_checkpoint
 from benchmarks.training.learner import learner
 from benchmarks.training.run import Order, train
 
@@ -56,6 +61,16 @@ def trained(order, out):
 
 def weights(model):
     return {name: tensor.clone() for name, tensor in model.policy.state_dict().items()}
+
+
+def flat(content):
+    """All numbers of parameters, optimisers' states and variables."""
+    if torch.is_tensor(content):
+        return content.reshape(-1).double()
+    if isinstance(content, dict):
+        content = [content[key] for key in sorted(content, key=str)]
+    parts = [flat(one) for one in content] if isinstance(content, list | tuple) else []
+    return torch.cat(parts) if parts else torch.zeros(0, dtype=torch.float64)
 
 
 def same(one, other):
@@ -102,10 +117,10 @@ def test_a_killed_training_comes_to_the_same_policy(algorithm, preset, monkeypat
         p._replace(wall_s=0.0) for p in resumed.course.curve
     ]
     ours, theirs = (
-        load_file(tmp_path / name / "checkpoints" / "000002" / "state.safetensors")
+        load_from_zip_file(tmp_path / name / "checkpoints/000002/model.zip", load_data=False)
         for name in ("whole", "killed")
     )
-    assert same(ours, theirs)
+    assert torch.equal(flat(ours), flat(theirs))
 
 
 def test_a_finished_training_run_again_trains_nothing(whole, preset, monkeypatch):
@@ -173,13 +188,37 @@ def test_another_order_in_the_folder_is_refused(killed, preset):
         trained(Order(preset(steps=1920), seed=3), killed)
 
 
+def executes(content):
+    """A zip with pickled data of Stable-Baselines3's kind, which runs code when it is loaded."""
+    pickled = base64.b64encode(cloudpickle.dumps(Runs())).decode()
+    data = json.dumps({"policy_class": {":type:": "", ":serialized:": pickled}})
+    made = io.BytesIO(content)
+    with zipfile.ZipFile(made, "a") as archive:
+        archive.writestr("data", data)
+    return made.getvalue()
+
+
+class Runs:
+    def __reduce__(self):
+        return exec, ("raise SystemExit('it ran')",)
+
+
 DAMAGE = {
-    "cut tensors": ("state.safetensors", lambda content: content[: len(content) // 2]),
-    "no tensors": ("state.safetensors", lambda content: b""),
+    "cut tensors": ("model.zip", lambda content: content[: len(content) // 2]),
+    "no tensors": ("model.zip", lambda content: b""),
+    "pickled tensors": ("model.zip", lambda content: pickled_weights()),
     "cut words": ("state.json", lambda content: content[: len(content) // 2]),
     "other words": ("state.json", lambda content: b"[1, 2]"),
     "no course": ("state.json", lambda content: content.replace(b'"curve"', b'"curved"')),
 }
+
+
+def pickled_weights():
+    weights, made = io.BytesIO(), io.BytesIO()
+    torch.save({"weight": Runs()}, weights)
+    with zipfile.ZipFile(made, "w") as archive:
+        archive.writestr("policy.pth", weights.getvalue())
+    return made.getvalue()
 
 
 @pytest.mark.parametrize("damage", DAMAGE)
@@ -188,16 +227,17 @@ def test_a_damaged_checkpoint_is_named_and_the_one_before_serves(damage, whole, 
     name, harm = DAMAGE[damage]
     last = folder / "checkpoints" / "000002"
     (last / name).write_bytes(harm((last / name).read_bytes()))
+    (folder / "checkpoints" / "000002 of monday").mkdir()
     assert same(tensors, weights(trained(Order(preset(), seed=3), folder).model))
     said = [line for line in capsys.readouterr().err.splitlines() if line.startswith("warning: ")]
     assert len(said) == 1 and "000002 is damaged" in said[0]
 
 
-def test_other_folders_beside_the_checkpoints_are_left_alone(tmp_path):
-    for name in ("000001", "000002 of monday"):
-        (tmp_path / name).mkdir()
-        (tmp_path / name / "state.json").write_text("{}")
-    assert latest(tmp_path) == (1, tmp_path / "000001")
+def test_nothing_in_a_checkpoint_executes(whole, preset):
+    folder, tensors, _ = whole
+    path = folder / "checkpoints" / "000002" / "model.zip"
+    path.write_bytes(executes(path.read_bytes()))
+    assert same(tensors, weights(trained(Order(preset(), seed=3), folder).model))
 
 
 # -- a full disk -----------------------------------------------------------------------------------
@@ -207,7 +247,7 @@ def _full(*_, **__):
     raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
 
-@pytest.mark.parametrize("what", ["save_file", "json"])
+@pytest.mark.parametrize("what", ["save_to_zip_file", "json"])
 def test_a_full_disk_leaves_the_last_checkpoint(what, whole, killed, preset, monkeypatch):
     order = Order(preset(), seed=3)
     with monkeypatch.context() as patched:
@@ -215,7 +255,7 @@ def test_a_full_disk_leaves_the_last_checkpoint(what, whole, killed, preset, mon
             patched.setattr("pathlib.Path.write_text", _full)
         else:
             patched.setattr(checkpoint, what, _full)
-        with pytest.raises(CheckpointError, match=r"No space left.*leg 1 stays in .*make room"):
+        with pytest.raises(CheckpointError, match=r"No space left.*before it stay; make room"):
             trained(order, killed)
     assert [p.name for p in (killed / "checkpoints").iterdir()] == ["000001"]
     assert same(whole[1], weights(trained(order, killed).model))
@@ -228,9 +268,9 @@ def test_a_file_that_may_not_grow_is_told(preset, tmp_path):
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (1000, hard))
     try:
-        with pytest.raises(CheckpointError, match=r"cannot be saved .* there is none before"):
+        with pytest.raises(CheckpointError, match=r"checkpoint 1 cannot be saved "):
             save_checkpoint(tmp_path, 1, model, WeightAverage(0.1, 960), {})
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
         envs.close()
-    assert latest(tmp_path) is None
+    assert not list(tmp_path.iterdir())

@@ -1,1 +1,0 @@
-"""A speed run as a document, as tables and as ratios with targets."""

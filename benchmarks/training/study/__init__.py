@@ -1,1 +1,0 @@
-"""Many trainings together: seeds, algorithms, what each piece of knowledge is worth, judged."""
