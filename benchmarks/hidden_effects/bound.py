@@ -40,6 +40,7 @@ from numpy.typing import NDArray  # noqa: E402
 from scipy.linalg import solve_toeplitz  # noqa: E402
 from scipy.stats import norm  # noqa: E402
 
+from benchmarks.hidden_effects.evaluation.measured import measured_now  # noqa: E402
 from benchmarks.hidden_effects.generation.effect_size import simulate_variants  # noqa: E402
 from benchmarks.hidden_effects.generation.groups import group  # noqa: E402
 from benchmarks.hidden_effects.physics.rig import (  # noqa: E402
@@ -213,7 +214,8 @@ def bounded(folder: Path, case: str) -> dict[str, Any]:
     effect = truth["effects"][0]
     orders = [float(named.order or 0.0) for named in dataset.trials]
     entry = distances(problem, model, orders, effect["name"])
-    return {"case": case, "effect": effect["name"], "r": effect["r"], **entry}
+    about = {"case": case, "effect": effect["name"], "r": effect["r"]}
+    return {**about, **entry, "measured": measured_now()}
 
 
 def curves(some: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
@@ -292,12 +294,16 @@ def main(
     typer.echo(table(by_effect))
 
 
+_KEPT = {"effect": str, "measured": {"commit": str, "date": str, "method": str}}
+"""Shape of what another run needs of a bound."""
+
+
 def _is_kept(path: Path) -> bool:
     """Whether a bound is there; a damaged one is computed anew."""
     if not path.is_file():
         return False
     try:
-        check_shape(read_json(path, "journal_mib", own=True, finite=False), {"effect": str})
+        check_shape(read_json(path, "journal_mib", own=True, finite=False), _KEPT)
     except ValueError as error:
         say_damaged(path, str(error))
         return False

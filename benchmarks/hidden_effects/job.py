@@ -3,7 +3,6 @@
 import json
 import sys
 import time
-from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -13,6 +12,7 @@ from benchmarks.executors.executor import Executor, ThisProcess, run_all
 from benchmarks.files import write_text
 from benchmarks.hidden_effects.evaluation import records, scoring
 from benchmarks.hidden_effects.evaluation.diagnosis import Judge, diagnosed
+from benchmarks.hidden_effects.evaluation.measured import measured_now
 from benchmarks.hidden_effects.evaluation.one_case import Work
 from benchmarks.hidden_effects.evaluation.records import CaseRecord
 from benchmarks.hidden_effects.evaluation.tables import percent, table
@@ -91,7 +91,7 @@ def run_block(order: Order) -> dict[str, Any] | None:
         JobError: the folder holds another set.
     """
     _claim(order)
-    code = fingerprint()
+    code, now = fingerprint(), measured_now()
     done = {
         record.number: record
         for record in judgeable(order)
@@ -108,8 +108,8 @@ def run_block(order: Order) -> dict[str, Any] | None:
 
     def on_done(index: int, result: object) -> None:
         if isinstance(result, CaseRecord):
-            records.write(result, order.folder)
-            done[result.number] = result
+            done[result.number] = replace(result, measured=now)
+            records.write(done[result.number], order.folder)
             progress.tell(result)
         else:
             failures.append(f"case {missing[index]}: {type(result).__name__}: {result}")
@@ -145,12 +145,10 @@ def judgeable(order: Order) -> list[CaseRecord]:
 def figures(order: Order, kept: Sequence[CaseRecord]) -> dict[str, Any]:
     """The figures of a block's records."""
     counted = scoring.count([scoring.outcome_of(record) for record in kept])
-    return {
-        "schema": 1,
-        "seed": order.seed,
-        "code": dict(Counter(record.code for record in kept)),
-        **counted,
-    }
+    measured = {tuple(record.measured.items()): record.measured for record in kept}
+    for block in counted["blocks"].values():
+        block["measured"] = list(measured.values())
+    return {"schema": 1, "seed": order.seed, **counted}
 
 
 def merged(documents: Sequence[dict[str, Any]]) -> dict[str, Any]:
@@ -158,9 +156,6 @@ def merged(documents: Sequence[dict[str, Any]]) -> dict[str, Any]:
     blocks: dict[str, Any] = {}
     for document in documents:
         blocks |= document["blocks"]
-    codes = Counter[str]()
-    for document in documents:
-        codes.update(document["code"])
     # A document that was merged before has a list of them.
     given = [document["seed"] for document in documents]
     seeds = sorted({s for each in given for s in (each if isinstance(each, list) else [each])})
@@ -168,7 +163,6 @@ def merged(documents: Sequence[dict[str, Any]]) -> dict[str, Any]:
     return {
         "schema": 1,
         "seed": seeds[0] if len(seeds) == 1 else seeds,
-        "code": dict(codes),
         "blocks": blocks,
         "failures": failures,
     }

@@ -50,7 +50,7 @@ def key(suite: FrozenSuite, spec: ControllerSpec) -> str:
     """
     parts = [suite.name, str(suite.version), suite.digest, code_digest(), spec.name]
     if spec.files:
-        parts.append(_digest(spec.files))
+        parts.append(digest_of(spec.files))
     return hashlib.sha256("\n".join(parts).encode()).hexdigest()[:16]
 
 
@@ -59,7 +59,7 @@ def code_digest() -> str:
     """Digest of the repository's code and of the packages' versions."""
     files = sorted(path for pattern in SOURCES for path in ROOT.glob(pattern))
     versions = [f"{name} {_version(name)}" for name in PACKAGES]
-    return hashlib.sha256("\n".join([_digest(files), *versions]).encode()).hexdigest()[:16]
+    return hashlib.sha256("\n".join([digest_of(files), *versions]).encode()).hexdigest()[:16]
 
 
 def code_digest_with(files: Sequence[Path]) -> str:
@@ -77,11 +77,12 @@ def _version(package: str) -> str:
         return "missing"
 
 
-def _digest(files: list[Path]) -> str:
+def digest_of(files: Sequence[Path], root: Path = ROOT) -> str:
+    """Digest of files, of their contents and of their names below a folder."""
     digest = hashlib.sha256()
     for path in files:
         content = path.read_bytes()
-        name = path.relative_to(ROOT) if path.is_relative_to(ROOT) else path.name
+        name = path.relative_to(root) if path.is_relative_to(root) else path.name
         digest.update(f"{name} {len(content)}\n".encode())
         digest.update(content)
     return digest.hexdigest()

@@ -7,8 +7,9 @@ from typing import Any
 from benchmarks.hidden_effects.baselines.comparison import COLUMNS
 from benchmarks.hidden_effects.baselines.registry import BASELINES
 from benchmarks.hidden_effects.bound import detected, identified
+from benchmarks.hidden_effects.evaluation.measured import measured_text
 from benchmarks.hidden_effects.evaluation.readme import diagnosis
-from benchmarks.hidden_effects.evaluation.summary import report_blocks
+from benchmarks.hidden_effects.evaluation.summary import measured_in, report_blocks
 from generators.text import code, table
 from pma_gym.pages.document import TextTable, to_markdown
 
@@ -23,7 +24,7 @@ def hidden_rates() -> str:
     """Every figure with its target, block by block."""
     every = report_blocks(_read("hidden-effects"))
     tables = [each for each in every if isinstance(each, TextTable)]
-    return to_markdown(tables[:1], {}, "")
+    return to_markdown(tables[:1], {}, "") + _measured()
 
 
 def hidden_summary() -> str:
@@ -55,7 +56,23 @@ def _own(block: str, title: str) -> str:
         for each in report_blocks(alone)
         if isinstance(each, TextTable) and each.title.startswith(title)
     ]
-    return to_markdown(tables, {}, "")
+    return to_markdown(tables, {}, "") + _measured(block)
+
+
+def _measured(*names: str) -> str:
+    """A sentence on what blocks were measured with, all if none is named."""
+    blocks = _read("hidden-effects")["blocks"]
+    return "\n" + measured_text(measured_in({name: blocks[name] for name in names or blocks}))
+
+
+def hidden_measured(*some: str) -> str:
+    """The same sentence for figures that a page has in its text.
+
+    Args:
+        some: COMMIT/DATE/METHOD of each measurement; METHOD is the digest.
+    """
+    names = ("commit", "date", "method")
+    return measured_text(dict(zip(names, each.split("/"), strict=True)) for each in some)
 
 
 def hidden_kinds() -> str:
@@ -76,7 +93,7 @@ def hidden_seconds() -> str:
         [code(name), blocks[name]["n"], f"{each['median']:.1f}", f"{each['most']:.0f}"]
         for name, each in times.items()
     ]
-    return table(["Block", "Cases", "Median (s)", "Most (s)"], rows, (1, 2, 3))
+    return table(["Block", "Cases", "Median (s)", "Most (s)"], rows, (1, 2, 3)) + "\n" + _measured()
 
 
 def hidden_confused() -> str:
@@ -90,7 +107,8 @@ def hidden_confused() -> str:
                 if other != hidden:
                     counts.setdefault((hidden, other), [0, 0])[place] += number
     rows = [[code(hidden), code(said), *each] for (hidden, said), each in sorted(counts.items())]
-    return table(["Hidden", "Said", *(code(each) for each in shown)], rows, (2, 3))
+    header = ["Hidden", "Said", *(code(each) for each in shown)]
+    return table(header, rows, (2, 3)) + "\n" + _measured(*shown)
 
 
 def hidden_misses() -> str:
@@ -101,12 +119,13 @@ def hidden_misses() -> str:
         for name, block in _read("hidden-effects")["blocks"].items()
         for miss in block["misses"]
     ]
-    return table(["Block", "Case", "Hidden", "r", "Said"], rows, (1, 3))
+    return table(["Block", "Case", "Hidden", "r", "Said"], rows, (1, 3)) + "\n" + _measured()
 
 
 def hidden_baselines() -> str:
     """The diagnosis, itself with one part off, and simpler baselines on the same cases."""
-    baselines = _read("baselines")["baselines"]
+    document = _read("baselines")
+    baselines = document["baselines"]
     shown = [
         name for name in COLUMNS if any(each["rates"][name]["n"] for each in baselines.values())
     ]
@@ -114,13 +133,15 @@ def hidden_baselines() -> str:
         [BASELINES[baseline].title, *(_hits(each["rates"][name]) for name in shown), _seconds(each)]
         for baseline, each in baselines.items()
     ]
-    return table(["Way", *shown, "s a case"], rows, range(1, len(shown) + 2))
+    text = table(["Way", *shown, "s a case"], rows, range(1, len(shown) + 2))
+    return f"{text}\n\n{measured_text(document['measured'])}"
 
 
 def hidden_bound() -> str:
     """How far effects are from nothing and from their nearest rival, and what that allows."""
     every: dict[str, list[dict[str, Any]]] = {}
-    for each in _read("bound")["cases"]:
+    cases_read = _read("bound")["cases"]
+    for each in cases_read:
         every.setdefault(each["effect"], []).append(each)
     rows = [
         [code(name), *(" / ".join(column) for column in zip(*map(_bound, some), strict=True))]
@@ -128,7 +149,8 @@ def hidden_bound() -> str:
         for some in [sorted(cases, key=lambda each: each["r"])]
     ]
     header = ["Hidden", "r", "d to nothing", "detected (%)", "Nearest rival", "d to it", "told (%)"]
-    return table(header, rows, range(1, 7))
+    text = table(header, rows, range(1, 7))
+    return f"{text}\n\n{measured_text(each['measured'] for each in cases_read)}"
 
 
 def _bound(each: dict[str, Any]) -> list[str]:

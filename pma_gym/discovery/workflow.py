@@ -302,7 +302,8 @@ class _Work:
         problem, fit = findings.proposed
         stated = Stated()
         if isinstance(self.asked, Dataset):
-            stated = Stated(self.asked.tolerance, self.asked.standard_error)
+            noise = {each.signal.name: each.shown for each in findings.floors}
+            stated = Stated(self.asked.tolerance, self.asked.standard_error, noise)
         pairs = zip(logged[0].signals, problem.noise, strict=True)
         humming = {signal.name for signal, noise in pairs if noise.lines}
         floors = acceptance_floors(logged, findings.named, stated, humming)

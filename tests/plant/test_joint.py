@@ -42,10 +42,11 @@ def swung(model, duration, command=0.0, name="torque_command"):
     return time, measured["angle"], measured["speed"]
 
 
-@pytest.mark.parametrize("start", [1.0, 60.0, 150.0])
-def test_a_pendulums_period_is_that_of_the_elliptic_integral(start):
+@pytest.mark.parametrize(("start", "turns"), [(1.0, 0), (60.0, 0), (60.0, 1000), (150.0, 0)])
+def test_a_pendulums_period_is_that_of_the_elliptic_integral(start, turns):
     weight = {"moment_n_m": 0.48, "offset_deg": 0.0}
-    time, angle, _ = swung(joint(True, start, joint_weight=weight), 3.0)
+    time, angle, _ = swung(joint(True, start + 360.0 * turns, joint_weight=weight), 3.0)
+    angle = angle - 2.0 * np.pi * turns
     falls = np.flatnonzero((angle[:-1] > 0.0) & (angle[1:] <= 0.0))
     crossed = [time[i] + (time[1] * angle[i] / (angle[i] - angle[i + 1])) for i in falls]
     period = 4.0 * np.sqrt(INERTIA / 0.48) * ellipk(np.sin(np.radians(start) / 2.0) ** 2)

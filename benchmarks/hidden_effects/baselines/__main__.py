@@ -32,7 +32,7 @@ def run(
 
     from benchmarks.hidden_effects.baselines import forest
     from benchmarks.hidden_effects.baselines.answers import ask_all
-    from benchmarks.hidden_effects.baselines.comparison import compared, table
+    from benchmarks.hidden_effects.baselines.comparison import compared, measured, table
     from benchmarks.hidden_effects.baselines.registry import BASELINES
     from pma_gym.files import replace_file
 
@@ -51,8 +51,8 @@ def run(
     ask_all(cases, chosen, jobs, seed)
     document = compared(cases, chosen)
     if json_file is not None:
-        text = json.dumps({"baselines": document, "left_out": left_out}, indent=1) + "\n"
-        replace_file(json_file, text.encode())
+        whole = {"measured": measured(cases, chosen), "baselines": document, "left_out": left_out}
+        replace_file(json_file, (json.dumps(whole, indent=1) + "\n").encode())
     typer.echo(table(document, left_out))
 
 

@@ -14,6 +14,7 @@ from typing import Any
 from benchmarks.executors.choice import local
 from benchmarks.executors.executor import run_or_raise
 from benchmarks.hidden_effects.baselines.registry import BASELINES
+from benchmarks.hidden_effects.evaluation.measured import measured_now
 from pma_gym.data.datasets.dataset import read_dataset
 from pma_gym.files import replace_file
 
@@ -78,6 +79,7 @@ def ask(question: Question, seed: int) -> str:
     except Exception as error:
         # A baseline that fails has no answer, and that counts.
         answer = {"error": f"{type(error).__name__}: {error}"}
+    answer["measured"] = measured_now()
     answer["seconds"] = round(time.perf_counter() - begun, 3)
     replace_file(question.file, (json.dumps(answer, indent=1) + "\n").encode())
     return f"{question.case.name} {question.baseline}: {_said(answer)}"

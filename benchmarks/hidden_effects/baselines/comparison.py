@@ -8,6 +8,7 @@ import numpy as np
 
 from benchmarks.hidden_effects.baselines.answers import answer_file
 from benchmarks.hidden_effects.baselines.registry import BASELINES
+from benchmarks.hidden_effects.evaluation.measured import Measured
 from benchmarks.hidden_effects.evaluation.scoring import rate
 from benchmarks.hidden_effects.evaluation.verdicts import Outcome, compare
 from pma_gym.documents import read_json
@@ -30,6 +31,13 @@ that hide one which no catalogue has."""
 def compared(folder: Path, baselines: Sequence[str]) -> dict[str, Any]:
     """Figures of each baseline that has answered, over the cases of a folder."""
     return {baseline: figures(*outcomes(folder, baseline)) for baseline in baselines}
+
+
+def measured(folder: Path, baselines: Sequence[str]) -> list[Measured]:
+    """What the answers of baselines were measured with, each once."""
+    files = [file for name in baselines for file in answer_file(folder, name, "").parent.iterdir()]
+    some = [read_json(file, "journal_mib", own=True, finite=False)["measured"] for file in files]
+    return [each for place, each in enumerate(some) if each not in some[:place]]
 
 
 def outcomes(folder: Path, baseline: str) -> tuple[list[Outcome], list[str]]:

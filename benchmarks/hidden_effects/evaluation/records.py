@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.files import write_text
+from benchmarks.hidden_effects.evaluation.measured import UNKNOWN
 from benchmarks.hidden_effects.generation.files import case_name
 from benchmarks.runner.damaged_results import say_damaged
 from pma_gym.document_shape import check_shape, shape_of
@@ -32,6 +33,7 @@ class CaseRecord:
         seconds: to draw it, to read and to diagnose it.
         code: fingerprint of the code that made it.
         most_rounds: how many experiments could follow.
+        measured: commit, date and method that answered it.
     """
 
     number: int
@@ -42,6 +44,7 @@ class CaseRecord:
     seconds: dict[str, float] = field(default_factory=dict)
     code: str = ""
     most_rounds: int = 0
+    measured: dict[str, str] = field(default_factory=lambda: dict(UNKNOWN))
 
 
 _SHAPE = shape_of(CaseRecord)

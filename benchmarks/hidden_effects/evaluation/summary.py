@@ -1,13 +1,14 @@
 """`python -m benchmarks hidden-effects-report`: several blocks' figures as one document."""
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from benchmarks.hidden_effects.evaluation.measured import Measured, measured_text
 from benchmarks.hidden_effects.evaluation.tables import instead, listed, percent
 from benchmarks.hidden_effects.job import SCORE, JobError, merged
-from pma_gym.document_shape import ListOf, ShapeError, Whole, check_shape
+from pma_gym.document_shape import ListOf, ShapeError, check_shape
 from pma_gym.documents import read_json
 from pma_gym.pages.document import Block, Heading, Paragraph, TextTable, to_html, to_markdown
 
@@ -15,7 +16,8 @@ MISSES = 40
 """How many misses of a block are listed; the rest are in its JSON."""
 
 
-_SCORE = {"seed": object, "code": {"*": Whole()}, "blocks": {"*": dict}, "failures": ListOf(str)}
+_MEASURED = ListOf({"commit": str, "date": str, "method": str}, 1)
+_SCORE = {"seed": object, "blocks": {"*": {"measured": _MEASURED}}, "failures": ListOf(str)}
 """Shape of the figures that the job writes."""
 
 
@@ -67,7 +69,7 @@ def report_blocks(document: dict[str, Any]) -> list[Block]:
     figures = document["blocks"]
     blocks: list[Block] = [
         Heading("Hidden effects", 1),
-        Paragraph(f"Seed {document['seed']}; code {listed(document['code'])} cases."),
+        Paragraph(f"Seed {document['seed']}. {measured_text(measured_in(figures))}"),
         TextTable(
             "Rates with 95 % Wilson intervals",
             ["block", "figure", "measured", "target", "verdict"],
@@ -78,6 +80,11 @@ def report_blocks(document: dict[str, Any]) -> list[Block]:
     for name, each in figures.items():
         blocks += [Heading(f"Block {name}"), *_own(each)]
     return blocks
+
+
+def measured_in(blocks: Mapping[str, Any]) -> list[Measured]:
+    """What the figures of blocks were measured with."""
+    return [each for block in blocks.values() for each in block["measured"]]
 
 
 def _rates(name: str, figures: dict[str, Any]) -> list[list[str]]:

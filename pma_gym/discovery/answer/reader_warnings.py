@@ -1,19 +1,22 @@
 """What the reader of a diagnosis must know first."""
 
+from pma_gym.data.trial_columns import BY_QUANTITY
 from pma_gym.discovery.answer.own_parameters import doubts
 from pma_gym.discovery.diagnosis import Verdict
 from pma_gym.discovery.fitting.fit_problem import FitProblem, Fitted
 from pma_gym.discovery.fitting.free_parameters import unit
+from pma_gym.discovery.preparation.acceptance_floors import NOISE
 from pma_gym.discovery.report.approximate_text import why_approximate
 from pma_gym.discovery.report.figure_text import figure
 from pma_gym.discovery.verdict.findings import Findings
 from pma_gym.discovery.verdict.unknown import Reason
-from pma_gym.units import with_unit
+from pma_gym.units import SI_FACTORS, with_unit
 
 
 def reader_warnings(findings: Findings) -> tuple[str, ...]:
     """Doubts, widened ranges, refits that were discarded or did not converge, a lone trial."""
     words = [*doubts(findings), *widened_ranges(findings.problem, findings.proposed[1])]
+    words += fine_tolerances(findings)
     if findings.discarded is not None:
         given, refitted = findings.discarded
         words.append(
@@ -28,6 +31,22 @@ def reader_warnings(findings: Findings) -> tuple[str, ...]:
             "data it was fitted to"
         )
     return tuple(words)
+
+
+def fine_tolerances(findings: Findings) -> list[str]:
+    """A sentence on each tolerance that is finer than the readings' noise."""
+    said = []
+    for name, each in findings.adequacy.signals.items():
+        if each.floor is not None and each.floor.source == NOISE and each.floor.tolerance:
+            column = BY_QUANTITY[name]
+            factor = SI_FACTORS[column.unit]
+            said.append(
+                f"{column.name}: the tolerance of {figure(each.floor.tolerance / factor)} "
+                f"{column.unit} is finer than the readings' noise of "
+                f"{figure(each.floor.level / factor)} {column.unit}, and no model comes closer to "
+                "readings than that: the noise is the limit"
+            )
+    return said
 
 
 def approximate_law_warnings(verdict: Verdict, unknown: Reason | None) -> list[str]:

@@ -1,7 +1,8 @@
 """What a signal's misfit is judged against before a verdict may deny missing structure.
 
 In this order: the scatter between repeats, which holds what the rig itself does not repeat; the
-tolerance that the lab gives in `dataset.toml`; the noise of the sensor in rest segments. A sensor
+tolerance that the lab gives in `dataset.toml`, or the readings' noise where that is coarser, for no
+model comes closer to readings than their noise; the noise of the sensor in rest segments. A sensor
 that stands still at rest, as an encoder on one count, shows no noise there: its rounding is no
 floor for an open-loop simulation. Of a summary (a few readings a trial) the standard error that a
 lab prints stands in the place of rest segments.
@@ -33,21 +34,24 @@ PLAIN = 0.3
 SUMMARY = 50
 """Readings a trial below which a signal is a summary, as a table's rows are."""
 
-REPEATS, TOLERANCE, REST, ERRORS = "repeats", "tolerance", "rest segments", "standard errors"
+REPEATS, TOLERANCE, NOISE = "repeats", "tolerance", "readings' noise"
+REST, ERRORS = "rest segments", "standard errors"
 """Where a floor comes from."""
 
 
 @dataclass(frozen=True)
 class Stated:
-    """What a lab states of its signals in `dataset.toml` (SI, by output).
+    """What is known of signals beside their readings (SI, by output).
 
     Attributes:
         tolerance: misfit that is good enough.
         standard_error: of a summary's readings.
+        noise: of the readings, as it is known before a fit.
     """
 
     tolerance: Mapping[str, float] = field(default_factory=dict)
     standard_error: Mapping[str, float] = field(default_factory=dict)
+    noise: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -56,11 +60,14 @@ class AcceptanceFloor:
 
     Attributes:
         level: root mean square (SI).
-        source: `repeats`, `tolerance`, `rest segments` or `standard errors`.
+        source: `repeats`, `tolerance`, `readings' noise` (of readings that have a finer tolerance),
+            `rest segments` or `standard errors`.
+        tolerance: that the lab gives (SI); None where it gives none.
     """
 
     level: float
     source: str
+    tolerance: float | None = None
 
 
 def acceptance_floors(
@@ -77,7 +84,7 @@ def acceptance_floors(
     Args:
         logged: the trials as they are read.
         named: the same, with what is known of repeats.
-        stated: what the lab states.
+        stated: what the lab states, and the readings' noise.
         humming: signals that have lines of mains.
     """
     floors = {}
@@ -90,14 +97,16 @@ def acceptance_floors(
             scatter = max(scatter, rest or 0.0)
         # What repeats itself is rounded alike each time; no simulation is.
         rounding = step_between(logged, channel) / np.sqrt(12.0)
+        tolerance, noise = stated.tolerance.get(name), stated.noise.get(name, 0.0)
         for source, level in (
             (REPEATS, scatter and max(scatter, rounding)),
-            (TOLERANCE, stated.tolerance.get(name)),
+            (NOISE, noise if tolerance and tolerance < noise else None),
+            (TOLERANCE, tolerance),
             (ERRORS, stated.standard_error.get(name)),
             (REST, rest),
         ):
             if level:
-                floors[name] = AcceptanceFloor(float(level), source)
+                floors[name] = AcceptanceFloor(float(level), source, tolerance)
                 break
     return floors
 

@@ -56,6 +56,8 @@ class Level:
         expected_step: the step that the sensor should have: the lab's, or of readings that keep to
             its levels the DAQ's; 0 where nobody knows.
         distinct: how many readings differ from each other.
+        shown: what of the level the readings show: where the model alone says it, no more than
+            neighbouring readings differ by.
     """
 
     signal: Signal
@@ -65,6 +67,7 @@ class Level:
     step: float
     expected_step: float
     distinct: int
+    shown: float = 0.0
 
 
 def initial_floors(
@@ -113,7 +116,9 @@ def _floor(
     distinct = distinct_readings(logged, channel)
     finest = FINEST * float(np.ptp(distinct)) if distinct.size else 0.0
     level = max(sources[source], float(rounding), finest)
-    return Level(signal, level, source, sources, step, expected, len(distinct))
+    shown = max(level_of_neighbours(parts), float(rounding)) if source == MODEL else level
+    count = len(distinct)
+    return Level(signal, level, source, sources, step, expected, count, min(level, shown))
 
 
 def _expected_step(signal: Signal, parts: Sequence[Array], stated: LabSensor | None) -> float:

@@ -1,7 +1,14 @@
 """What is left of the signals in sentences: how many floors, and which log would decide."""
 
 from pma_gym.discovery.diagnosis import Diagnosis
-from pma_gym.discovery.preparation.acceptance_floors import ENOUGH, ERRORS, REPEATS, REST, TOLERANCE
+from pma_gym.discovery.preparation.acceptance_floors import (
+    ENOUGH,
+    ERRORS,
+    NOISE,
+    REPEATS,
+    REST,
+    TOLERANCE,
+)
 from pma_gym.discovery.report.figure_text import figure, listed, signal_name, signal_unit
 from pma_gym.discovery.result.noise import Judgement
 from pma_gym.discovery.verdict.adequacy import LEAST_BLOCKS, MOST_EXPLAINED, MOST_FLOORS, OPEN
@@ -9,6 +16,7 @@ from pma_gym.discovery.verdict.adequacy import LEAST_BLOCKS, MOST_EXPLAINED, MOS
 FLOORS = {
     REPEATS: "the scatter between repeats",
     TOLERANCE: "the tolerance",
+    NOISE: "the readings' noise",
     REST: "the noise at rest",
     ERRORS: "the standard error",
 }
@@ -27,14 +35,16 @@ def agreement(diagnosis: Diagnosis) -> str:
 
 def remainder(diagnosis: Diagnosis) -> str:
     """What is left where a model agrees: the noise of the sensors, or what repeats differ by."""
-    sources = list(dict.fromkeys(each.source for each in diagnosis.adequacy.values()))
+    sources = [each.source for each in diagnosis.adequacy.values()]
     what = {
+        NOISE: "the noise of the sensors",
         REST: "the noise of the sensors",
         REPEATS: "what repeats differ by",
         TOLERANCE: "less than the tolerance",
         ERRORS: "the standard error of the readings",
     }
-    return listed([what[source] for source in sources if source]) or "the noise of the sensors"
+    said = dict.fromkeys(what[source] for source in sources if source)
+    return listed(list(said)) or "the noise of the sensors"
 
 
 def floors_left(diagnosis: Diagnosis) -> str:

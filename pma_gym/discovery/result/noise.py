@@ -60,7 +60,8 @@ class Judgement:
 
     Attributes:
         floor: what it is judged against, in the column's unit; None where nothing tells.
-        source: `repeats`, `tolerance`, `rest segments` or `standard errors`; empty without a floor.
+        source: `repeats`, `tolerance`, `readings' noise`, `rest segments` or `standard errors`;
+            empty without a floor.
         misfit: root mean square on readings that the fits had not seen; None where unknown.
         explained: of it by a flexible regression on state, command and its history.
         bound: upper 95 % bound of that.

@@ -13,6 +13,7 @@ from benchmarks.executors.choice import local
 from benchmarks.hidden_effects import job
 from benchmarks.hidden_effects.evaluation import scoring
 from benchmarks.hidden_effects.evaluation.diagnosis import Answer
+from benchmarks.hidden_effects.evaluation.measured import measured_text, method_digest
 from benchmarks.hidden_effects.evaluation.rounds import follow, with_trial
 from benchmarks.hidden_effects.evaluation.targets import RATES
 from benchmarks.hidden_effects.evaluation.verdicts import compare, unanswered
@@ -105,15 +106,19 @@ def test_trials_are_kept_on_demand(tmp_path):
     assert (tmp_path / "data" / "cases" / "case_0001" / "dataset.toml").is_file()
 
 
+def code_of_first(folder):
+    return json.loads((folder / "cases" / "case_0001.json").read_text("utf-8"))["code"]
+
+
 def test_records_of_other_code_are_used_unless_made_anew(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(job, "fingerprint", lambda: "older")
     run_block(order(tmp_path, count=1))
     monkeypatch.setattr(job, "fingerprint", lambda: "newer")
     records = run_block(order(tmp_path, count=1))
-    assert records is not None and records["code"] == {"older": 1}
+    assert records is not None and code_of_first(tmp_path) == "older"
     assert "1 of them by other code" in capsys.readouterr().err
     records = run_block(order(tmp_path, count=1, recompute=True))
-    assert records is not None and records["code"] == {"newer": 1}
+    assert records is not None and code_of_first(tmp_path) == "newer"
 
 
 def test_cases_without_the_rounds_that_are_asked_for_are_made_anew(tmp_path, capsys):
@@ -287,3 +292,21 @@ def test_a_page_has_every_block_once(whole, tmp_path):
     assert torn.exit_code == 2 and "page.html is no JSON file" in torn.stderr
     nowhere = CliRunner().invoke(app, ["hidden-effects-report", str(tmp_path)])
     assert nowhere.exit_code == 2 and "there is no such file" in nowhere.stderr
+
+
+def test_figures_say_what_measured_them_and_that_the_method_has_changed_since(whole, tmp_path):
+    old, new = ({"commit": "1234abcd", "date": "2026-11-22", "method": m} for m in "ab")
+    same = "Measured by `1234abcd` on 2026-11-22"
+    assert measured_text([old, old], "a") == f"{same}."
+    for some in ([old], [old, new]):
+        assert measured_text(some, "b").endswith(
+            " on 2026-11-22; **the method has changed since**."
+        )
+    (now,) = whole[1]["blocks"]["nothing"]["measured"]
+    assert now["method"] == method_digest() and "changed" not in measured_text([now])
+    source = tmp_path / "pma_gym" / "discovery" / "fit.py"
+    source.parent.mkdir(parents=True)
+    source.write_text("a = 1")
+    before = method_digest(tmp_path)
+    source.write_text("a = 2")
+    assert method_digest(tmp_path) != before

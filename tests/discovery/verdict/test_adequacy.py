@@ -47,6 +47,12 @@ def moving(number):
     return pieces
 
 
+def rounded(trial, step):
+    """As an encoder reads the contraction (m)."""
+    read = step * np.round(trial.measurements["contraction"] / step)
+    return replace(trial, measurements={**trial.measurements, "contraction": read})
+
+
 # -- floors ----------------------------------------------------------------------------------------
 
 
@@ -69,6 +75,22 @@ def test_a_tolerance_comes_before_rest_and_repeats_before_a_tolerance():
     for name in RIGS["station"].outputs:
         assert levels[name].source == "repeats"
         assert levels[name].level == pytest.approx(TRUE[name], rel=0.15)
+
+
+@pytest.mark.parametrize(("step", "tolerance"), [(0.0, 1e-5), (2.5e-4, 3e-5)])
+def test_a_tolerance_that_is_finer_than_the_readings_is_no_structure(step, tolerance):
+    """Of a sensor's noise, and of an encoder's rounding; the signals keep to commands that move."""
+    trials = [rounded(trial, step) if step else trial for trial in moving(3)]
+    level = np.hypot(TRUE["contraction"], step / np.sqrt(12.0))
+    stated = {name: 0.3 * level for name, level in TRUE.items()} | {"contraction": tolerance}
+    asked = Dataset("Logs", None, tuple(named(trials)), tolerance=stated)
+    diagnosis = refit(asked, STATION)
+    assert diagnosis.verdict in ("agrees", "parameters"), diagnosis.sentence
+    judged = diagnosis.adequacy["contraction_mm"]
+    assert judged.source == "readings' noise"
+    assert judged.floor == pytest.approx(1e3 * level, rel=0.15)
+    (said,) = (each for each in diagnosis.warnings if each.startswith("contraction_mm"))
+    assert f"the tolerance of {1e3 * tolerance:g} mm is finer than the readings' noise of" in said
 
 
 def test_the_scatter_of_repeats_holds_what_the_rig_does_not_repeat():

@@ -1,6 +1,6 @@
 """Trials beside the given model's simulation of their commands, as the checks compare them."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -39,19 +39,23 @@ class Pair:
         return self.trial.time[there], self.simulated.measurements[quantity][there], measured[there]
 
 
-def pairs(model: Model, trials: Sequence[Trial], pressure: float = 0.0) -> list[Pair]:
+def pairs(
+    model: Model,
+    trials: Sequence[Trial],
+    corrected: Callable[[Array], Array] | None = None,
+) -> list[Pair]:
     """The trials that the model can simulate, beside its simulations.
 
     Args:
         model: the given model, a station.
         trials: the trials.
-        pressure: what is added to commanded pressures (Pa).
+        corrected: makes of commanded pressures what they should be (Pa); None where they are right.
     """
     plant = Plant(model)
     every = []
     for number, trial in enumerate(trials):
         try:
-            simulated = plant.simulate(_with_pressure(trial, pressure), noise=False)
+            simulated = plant.simulate(_with_pressure(trial, corrected), noise=False)
         # Commands that the model cannot follow: its own fit says so, in its own words.
         except ValueError:
             continue
@@ -60,8 +64,8 @@ def pairs(model: Model, trials: Sequence[Trial], pressure: float = 0.0) -> list[
     return every
 
 
-def _with_pressure(trial: Trial, pressure: float) -> Trial:
-    wished = trial.commands.get("pressure_command")
-    if not pressure or wished is None:
+def _with_pressure(trial: Trial, corrected: Callable[[Array], Array] | None) -> Trial:
+    commanded = trial.commands.get("pressure_command")
+    if corrected is None or commanded is None:
         return trial
-    return replace(trial, commands={**trial.commands, "pressure_command": wished + pressure})
+    return replace(trial, commands={**trial.commands, "pressure_command": corrected(commanded)})

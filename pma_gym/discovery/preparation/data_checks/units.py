@@ -34,6 +34,10 @@ class Unit:
     offset: float = 0.0
     command: bool = False
 
+    def corrected(self, value: Array) -> Array:
+        """What a reading in the unit should be (SI)."""
+        return (value - self.offset) / self.factor
+
 
 MOTION_UNITS = {
     "contraction": (
@@ -91,10 +95,12 @@ _SCALES = (
     (7.500617, "millimetres of mercury"),
 )
 
+ABSOLUTE = Unit(1.0, "absolute pressure", ATMOSPHERE)
+
 PRESSURE_UNITS = (
     *(Unit(factor, words) for factor, words in _SCALES[1:]),
     *(Unit(f, f"absolute pressure in {words}", f * ATMOSPHERE) for f, words in _SCALES[1:]),
-    Unit(1.0, "absolute pressure", ATMOSPHERE),
+    ABSOLUTE,
     Unit(-1.0, "the opposite sign"),
 )
 

@@ -6,13 +6,16 @@ import numpy as np
 
 from pma_gym.data.datasets.dataset import Dataset, NamedTrial
 from pma_gym.data.signals import SIGNALS
+from pma_gym.data.trial import Trial
 from pma_gym.data.trial_columns import BY_QUANTITY
-from pma_gym.discovery.preparation.data_checks.absolute import both_absolute
 from pma_gym.discovery.preparation.data_checks.clock import wrong_clock
+from pma_gym.discovery.preparation.data_checks.pressure_level import Level, pressure_level
 from pma_gym.discovery.preparation.data_checks.proposals import instruction, lines
 from pma_gym.discovery.preparation.data_checks.simulated import ATMOSPHERE, Pair, pairs
 from pma_gym.discovery.preparation.data_checks.units import (
+    ABSOLUTE,
     MOTION_UNITS,
+    PRESSURE_FAR,
     Unit,
     motion_unit,
     pressure_unit,
@@ -47,8 +50,8 @@ def unit_proposals(dataset: Dataset, named: Sequence[NamedTrial], model: Model) 
     unit = pressure_unit(simulated)
     if unit is not None:
         said.append(_of_pressure(dataset, named, simulated, unit))
-    elif (misfits := both_absolute(model, trials)) is not None:
-        said.append(_of_both(dataset, named, *misfits))
+    elif (level := pressure_level(model, trials)) is not None:
+        said.append(_of_both(dataset, named, level))
     return said
 
 
@@ -137,21 +140,39 @@ def _of_pressure(
     return f"{seen}: {unit.words}; {_for_unit(dataset, named, 'pressure', unit)}"
 
 
-def _of_both(dataset: Dataset, named: Sequence[NamedTrial], given: float, off: float) -> str:
-    names = [each.name for each in named]
-    both = any(each.trial.measures("pressure") for each in named)
-    what = (
-        "pressure_command_kpa and pressure_kpa both read" if both else "pressure_command_kpa reads"
+def _of_both(dataset: Dataset, named: Sequence[NamedTrial], level: Level) -> str:
+    """How to correct commanded pressures, and measured ones that agree with them."""
+    names, unit = [each.name for each in named], level.unit
+    quantities = ["pressure_command", "pressure"]
+    if not any(_agree(each.trial) for each in named):
+        quantities.pop()
+    columns = " and ".join(BY_QUANTITY[each].name for each in quantities)
+    said = "both read" if len(quantities) > 1 else "reads"
+    (low, high), (lowest, highest) = level.commanded, level.valid
+    seen = (
+        "101.3 kPa above gauge pressure"
+        if unit == ABSOLUTE
+        else f"{low / 1e3:.3g} to {high / 1e3:.3g} kPa, where the model holds from "
+        f"{lowest / 1e3:.3g} to {highest / 1e3:.3g} kPa"
     )
-    before = f"not {1e3 * given:.2g} mm" if np.isfinite(given) else "and cannot follow them now"
-    written = lines(dataset, names, "pressure_command", 1.0, -ATMOSPHERE)
-    if both:
-        written |= lines(dataset, names, "pressure", 1.0, -ATMOSPHERE)
+    given = f"not {1e3 * level.given:.2g} mm"
+    before = given if np.isfinite(level.given) else "and cannot follow them now"
+    written: dict[str, str] = {}
+    for quantity in quantities:
+        offset = -unit.offset / unit.factor
+        written |= lines(dataset, names, quantity, 1.0 / unit.factor, offset)
     return (
-        f"{what} 101.3 kPa above gauge pressure: absolute pressure (with 101.3 kPa less the model "
-        f"misses contraction by {1e3 * off:.2g} mm, {before}); "
-        f"{instruction(written, dataset.columns)}"
+        f"{columns} {said} {seen}: {unit.words} (corrected, the model misses contraction by "
+        f"{1e3 * level.corrected:.2g} mm, {before}); {instruction(written, dataset.columns)}"
     )
+
+
+def _agree(trial: Trial) -> bool:
+    """Whether measured pressures are what the commands ask for, most of the time."""
+    measured, command = trial.measurements.get("pressure"), trial.commands["pressure_command"]
+    if measured is None:
+        return False
+    return bool(np.nanmedian(np.abs(measured - command)) < PRESSURE_FAR * np.median(command))
 
 
 def _how(

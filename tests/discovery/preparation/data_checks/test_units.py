@@ -66,17 +66,32 @@ def test_a_unit_is_named_and_its_line_corrects_it(tmp_path, kind):
             assert abs(np.median(given - there)) <= spread
 
 
-def test_both_pressures_absolute(tmp_path):
+BOTH = {
+    "absolute": (1.0, 101.3, "101.3 kPa above gauge pressure: absolute pressure"),
+    "psi": (1 / 6.894757, 0.0, "where the model holds from 150 to 575 kPa: psi"),
+    "absolute psi": (1 / 6.894757, 101.325 / 6.894757, ": absolute pressure in psi"),
+    "mmHg": (7.500617, 0.0, ": millimetres of mercury"),
+}
+
+
+@pytest.mark.parametrize(
+    ("kind", "unread"),
+    [*((kind, ()) for kind in BOTH), ("psi", (BAR,)), ("psi", (BAR, "contraction_mm"))],
+)
+def test_command_and_reading_alike_are_in_another_unit(tmp_path, kind, unread):
+    factor, offset, words = BOTH[kind]
+    right = [{k: v for k, v in each.items() if k not in unread} for each in logs()]
     both = [
-        {k: v + 101.3 * (k in ("pressure_command_kpa", BAR)) for k, v in each.items()}
-        for each in logs()
+        {k: factor * v + offset if "pressure" in k else v for k, v in each.items()}
+        for each in right
     ]
     folder = write(tmp_path / "lab", both)
-    with pytest.raises(TrialError, match="absolute pressure") as caught:
+    with pytest.raises(TrialError, match=re.escape(words)) as caught:
         checked(folder)
-    assert str(caught.value).count("offset = -101.325") == 2
-    (folder / "dataset.toml").write_text(lines_of(str(caught.value)))
-    assert checked(folder).checked == ()
+    written = lines_of(str(caught.value))
+    assert written.count("pressure_") == 2 * (2 - (BAR in unread))
+    (folder / "dataset.toml").write_text(written)
+    assert checked(folder).checked == checked(write(tmp_path / "right", right)).checked
 
 
 def test_a_command_alone_may_be_absolute(tmp_path):
