@@ -150,3 +150,24 @@ def test_suites_are_json_for_programs():
 def test_json_has_null_for_what_is_no_number(capsys):
     print_json({"a": (math.inf, 1.0), "b": [math.nan]})
     assert json.loads(capsys.readouterr().out) == {"a": [None, 1.0], "b": [None]}
+
+
+@pytest.mark.parametrize("program", PROGRAMS)
+def test_an_empty_text_is_refused_for_every_argument_and_option(program):
+    group = GROUPS[program]
+    refused = 0
+    for name, command in [("", group), *group.commands.items()]:
+        for param in command.params:
+            if getattr(param, "is_flag", False):
+                continue
+            needed = [p for p in command.params if p.required and p is not param]
+            option = param.opts[0].startswith("-")
+            words = [*filter(None, [name]), *([param.opts[0]] if option else []), " "]
+            # Parameters are processed in order; those before an argument must not be missing.
+            for other in needed:
+                words += [other.opts[0], "1"] if other.opts[0].startswith("-") else ["1"]
+            done = CliRunner().invoke(PROGRAMS[program], words)
+            assert done.exit_code == 2, words
+            assert "it is empty, like a shell variable that is not set" in done.output, words
+            refused += 1
+    assert refused > 15

@@ -26,16 +26,16 @@ def register(app: typer.Typer) -> None:
 
 def exercise(
     muscles: Annotated[
-        str, typer.Option(help="How many side by side; several by commas, common ones if empty.")
+        str, typer.Option(help="How many side by side; several by commas, else common ones.")
     ] = "",
     diameter: Annotated[
-        str, typer.Option(help="Of a muscle (mm); several by commas, 10, 20 and 40 if empty.")
+        str, typer.Option(help="Of a muscle (mm); several by commas, else 10, 20 and 40.")
     ] = "",
     length: Annotated[
-        str, typer.Option(help="Of a muscle at rest (mm); several by commas, common if empty.")
+        str, typer.Option(help="Of a muscle at rest (mm); several by commas, else common.")
     ] = "",
     radius: Annotated[
-        str, typer.Option(help="Of the pulley (mm); several by commas, the station's if empty.")
+        str, typer.Option(help="Of the pulley (mm); several by commas, else the station's.")
     ] = "",
     moment: Annotated[
         float | None,
@@ -94,7 +94,7 @@ def lag(
         int, typer.Option(help="Whose course is searched through; 0: the linear bounds alone.")
     ] = 8,
     pressures: Annotated[
-        str, typer.Option(help="That episodes begin at (kPa), by commas; by the seed if empty.")
+        str, typer.Option(help="That episodes begin at (kPa), by commas; else by the seed.")
     ] = "",
     safety: Annotated[bool, typer.Option(help="Also behind the safety layer.")] = False,
     out: Annotated[Path, typer.Option(help="Folder of the tables.")] = RESULTS / "lag",

@@ -30,7 +30,7 @@ def speed(
         typer.Option(help="Only what shows a loss of vectorisation; exit code 1 if so."),
     ] = False,
     only: Annotated[
-        str, typer.Option(help="Rows by commas, such as single or 'batch/own*'; all if empty.")
+        str, typer.Option(help="Rows by commas, such as single or 'batch/own*'; else all.")
     ] = "",
     quick: Annotated[bool, typer.Option(help="A smoke run, whose figures say little.")] = False,
 ) -> None:

@@ -29,7 +29,7 @@ def _old_name(names: str) -> str:
 @app.command()
 def run(
     cases: Annotated[Path, typer.Option(help="Folder that `draw` or `take` wrote.", exists=True)],
-    baselines: Annotated[str, typer.Option(help="By commas; all if empty.")] = "",
+    baselines: Annotated[str, typer.Option(help="By commas; else all.")] = "",
     old_baselines: Annotated[str, typer.Option("--ways", hidden=True, callback=_old_name)] = "",
     jobs: Jobs = 1,
     seed: Annotated[int, typer.Option(help="Of what a baseline draws.")] = 0,

@@ -18,7 +18,7 @@ app = StrictTyper(add_completion=False, pretty_exceptions_enable=False, rich_mar
 
 Out = Annotated[Path, typer.Option(help="Folder of the study.")]
 Jobs = Annotated[int, typer.Option(min=1, help="Processes.")]
-Groups = Annotated[str, typer.Option(help="Groups by commas; all if empty.")]
+Groups = Annotated[str, typer.Option(help="Groups by commas; else all.")]
 
 
 @app.command()

@@ -33,6 +33,7 @@ from pma_gym.data.trial_columns import (
     suggestion,
 )
 from pma_gym.files import OutputError, check_output, replace_file
+from pma_gym.paths import as_path
 
 __all__ = [
     "USUAL_S",
@@ -129,7 +130,7 @@ def check_writable(path: str | os.PathLike[str]) -> None:
     Raises:
         TrialError: unknown suffix, a folder, no such folder, or no leave to write.
     """
-    path = Path(path)
+    path = as_path(path, TrialError)
     if not path.is_dir():
         _written_suffix(path)
     try:
