@@ -135,7 +135,10 @@ def _with_time(tables: list[Table], request: Request) -> list[Table]:
     if not timed:
         filled = [table for table in tables if table.rows]
         if not filled:
-            raise UnreadableError(f"{tables[0].file} has a header but no rows; {_NEEDED}")
+            cause = " that can be read: " + tables[0].remarks[-1] if tables[0].remarks else ""
+            raise UnreadableError(
+                f"{tables[0].file} has a header but no rows{cause or f'; {_NEEDED}'}"
+            )
         return filled
     said = tuple(
         f"its part {table.part!r} is passed over: "
