@@ -174,9 +174,8 @@ def write_trial(trial: Trial, path: str | os.PathLike[str]) -> None:
             `pma-gym[files]` is missing.
         OSError: the disk refuses.
     """
-    path = Path(path)
     check_writable(path)
-    replace_file(path, encode_trial(trial, path))
+    replace_file(Path(path), encode_trial(trial, path))
 
 
 def encode_trial(trial: Trial, path: str | os.PathLike[str]) -> bytes:
