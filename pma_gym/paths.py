@@ -5,6 +5,17 @@ import os
 from pathlib import Path
 
 
+def as_path(path: str | os.PathLike[str], error: type[ValueError] = ValueError) -> Path:
+    """Return a path; refuse an empty text, which `Path` takes for the current folder.
+
+    Raises:
+        ValueError: of the type of `error`.
+    """
+    if not os.fspath(path).strip():
+        raise error("the path is empty; name a file or a folder ('.' is the current one)")
+    return Path(path)
+
+
 def is_path(source: str | Path) -> bool:
     """Return whether text is a path (a separator, or ending .toml), not a shipped name.
 

@@ -15,8 +15,12 @@ from typer.testing import CliRunner
 import benchmarks.__main__
 import pma_gym
 import pma_gym.cli
+from controllers.policies.policy_file import load_policy_file
 from pma_gym.cli import main
 from pma_gym.cli.terminal import print_json
+from pma_gym.data.datasets.dataset import read_dataset
+from pma_gym.data.files.trial_files import read_trial, write_trial
+from pma_gym.effects.user_effects import load_effects
 from pma_gym.tasks import EVERY_TASK
 
 SCREEN = 24
@@ -133,8 +137,6 @@ def test_info_is_json_for_programs(run):
 def test_an_evaluation_is_json_for_programs(run, tmp_path):
     time = np.arange(1923) / 384.0
     asked = pma_gym.Trial(time, {"motor_voltage": 0.9 * time, "regulator_voltage": 0 * time + 5.0})
-    from pma_gym.data.files.trial_files import write_trial
-
     write_trial(pma_gym.Plant("serres2008").simulate(asked), tmp_path / "trial.csv")
     (row,) = json.loads(run("evaluate", "trial.csv", "--task", "displacement", "--json")[1])
     table = run("evaluate", "trial.csv", "--task", "displacement")[1]
@@ -150,3 +152,39 @@ def test_suites_are_json_for_programs():
 def test_json_has_null_for_what_is_no_number(capsys):
     print_json({"a": (math.inf, 1.0), "b": [math.nan]})
     assert json.loads(capsys.readouterr().out) == {"a": [None, 1.0], "b": [None]}
+
+
+@pytest.mark.parametrize("program", PROGRAMS)
+def test_an_empty_text_is_refused_for_every_argument_and_option(program):
+    group = GROUPS[program]
+    refused = 0
+    for name, command in [("", group), *group.commands.items()]:
+        for param in command.params:
+            if getattr(param, "is_flag", False):
+                continue
+            needed = [p for p in command.params if p.required and p is not param]
+            option = param.opts[0].startswith("-")
+            words = [*filter(None, [name]), *([param.opts[0]] if option else []), " "]
+            # Parameters are processed in order; those before an argument must not be missing.
+            for other in needed:
+                words += [other.opts[0], "1"] if other.opts[0].startswith("-") else ["1"]
+            done = CliRunner().invoke(PROGRAMS[program], words)
+            assert done.exit_code == 2, words
+            assert "it is empty, like a shell variable that is not set" in done.output, words
+            refused += 1
+    assert refused > 15
+
+
+@pytest.mark.parametrize("path", ["", " "])
+def test_an_empty_path_is_refused_by_the_library(path):
+    calls = [
+        read_trial,
+        read_dataset,
+        load_effects,
+        load_policy_file,
+        pma_gym.load_model,
+        lambda path: write_trial(pma_gym.Trial([0.0], {"motor_voltage": [0.0]}), path),
+    ]
+    for call in calls:
+        with pytest.raises(ValueError, match="the path is empty|no model ' ?'"):
+            call(path)

@@ -25,16 +25,16 @@ def register(app: typer.Typer) -> None:
 
 def exercise(
     muscles: Annotated[
-        str, typer.Option(help="How many side by side; several by commas, common ones if empty.")
+        str, typer.Option(help="How many side by side; several by commas, else common ones.")
     ] = "",
     diameter: Annotated[
-        str, typer.Option(help="Of a muscle (mm); several by commas, 10, 20 and 40 if empty.")
+        str, typer.Option(help="Of a muscle (mm); several by commas, else 10, 20 and 40.")
     ] = "",
     length: Annotated[
-        str, typer.Option(help="Of a muscle at rest (mm); several by commas, common if empty.")
+        str, typer.Option(help="Of a muscle at rest (mm); several by commas, else common.")
     ] = "",
     radius: Annotated[
-        str, typer.Option(help="Of the pulley (mm); several by commas, the station's if empty.")
+        str, typer.Option(help="Of the pulley (mm); several by commas, else the station's.")
     ] = "",
     moment: Annotated[
         float | None,

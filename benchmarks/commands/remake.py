@@ -15,7 +15,7 @@ def register(app: typer.Typer) -> None:
 
 
 def remake(
-    only: Annotated[str, typer.Option(help="Steps by commas, see --list; all if empty.")] = "",
+    only: Annotated[str, typer.Option(help="Steps by commas, see --list; else all.")] = "",
     without: Annotated[str, typer.Option(help="Steps that are left out, by commas.")] = "",
     steps: Annotated[
         bool, typer.Option("--list", help="List the steps and what is left, and stop.")

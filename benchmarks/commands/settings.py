@@ -51,7 +51,7 @@ def tune(
 
 def design(
     controllers: Annotated[
-        str, typer.Option(help="Names by commas; all that have settings if empty.")
+        str, typer.Option(help="Names by commas; else all that have settings.")
     ] = "",
     out: OptionalOut = None,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the noise.")] = 0,

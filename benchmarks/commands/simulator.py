@@ -22,7 +22,7 @@ def speed(
         typer.Option(help="Only ratios that hold everywhere; exit code 1 if one does not."),
     ] = False,
     only: Annotated[
-        str, typer.Option(help="Rows by commas, such as single or 'batch/own*'; all if empty.")
+        str, typer.Option(help="Rows by commas, such as single or 'batch/own*'; else all.")
     ] = "",
     quick: Annotated[bool, typer.Option(help="A smoke run, whose figures say little.")] = False,
 ) -> None:

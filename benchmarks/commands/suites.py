@@ -106,7 +106,7 @@ def report(
 
 def add(
     controller: Annotated[str, typer.Argument(help="path/to/file.py:ClassName")],
-    suite: Annotated[str, typer.Option(help="Suites by commas; all but `many` if empty.")] = "",
+    suite: Annotated[str, typer.Option(help="Suites by commas; else all but `many`.")] = "",
     jobs: Jobs = 2,
     results: Annotated[
         Path, typer.Option(help="Folder with a folder of results for each suite.")
@@ -133,7 +133,7 @@ def add(
 
 def remove(
     controller: Annotated[str, typer.Argument(help="Name as the journal has it: the class.")],
-    suite: Annotated[str, typer.Option(help="Suites by commas; all if empty.")] = "",
+    suite: Annotated[str, typer.Option(help="Suites by commas; else all.")] = "",
     results: Annotated[
         Path, typer.Option(help="Folder with a folder of results for each suite.")
     ] = RESULTS,

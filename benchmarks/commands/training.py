@@ -124,7 +124,7 @@ def export(
     model: Annotated[Path, typer.Argument(help="Zip that Stable-Baselines3 saved.")],
     env: Annotated[str, typer.Option(help="Id of the environment that it was trained on.")],
     env_kwargs: Annotated[str, typer.Option(help="Its keyword arguments, as JSON.")] = "{}",
-    algo: Annotated[str, typer.Option(help="ppo, sac, td3 or tqc; read off if empty.")] = "",
+    algo: Annotated[str, typer.Option(help="ppo, sac, td3 or tqc; else read off.")] = "",
     vecnormalize: Annotated[
         Path | None, typer.Option(help="Its statistics, if it was trained in a VecNormalize.")
     ] = None,

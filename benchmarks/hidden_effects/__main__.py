@@ -31,7 +31,7 @@ def draw(
     seed: Annotated[int, typer.Option(help="Same seed, same bits.")] = 0,
     blocks: Annotated[str, typer.Option(help="By commas; cases take turns.")] = ",".join(BLOCKS),
     effects: Annotated[
-        str, typer.Option(help="Effects that cases of block single take turns in; all if empty.")
+        str, typer.Option(help="Effects that cases of block single take turns in; else all.")
     ] = "",
     ratio: Annotated[str, typer.Option(help="Range of r, the change over the noise.")] = "0.5,2",
     trials: Annotated[int, typer.Option(min=3, help="Trials of a case.")] = 6,

@@ -1,5 +1,6 @@
 """How a policy's action becomes a voltage: as it is, as a change, or added to a controller's."""
 
+import reprlib
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import Any, Literal
@@ -43,10 +44,11 @@ class ActionMapping:
             )
         if self.kind == "direct" and authority != MIDDLE_V:
             raise ValueError(f"a direct form has authority_v {MIDDLE_V:g}, got {authority:g} V")
-        if (self.base is not None) != (self.kind == "residual"):
+        named = isinstance(self.base, str) and bool(self.base.strip())
+        if not (named if self.kind == "residual" else self.base is None):
             raise ValueError(
-                f"a residual names its base, the other forms have none; got kind {self.kind!r} "
-                f"with base {self.base!r}"
+                "a residual names its base, a text, the other forms have none; got kind "
+                f"{self.kind!r} with base {reprlib.repr(self.base)}"
             )
 
     @classmethod

@@ -21,6 +21,7 @@ from controllers.policies.network import Weights, check_chain
 from controllers.policies.observation_spec import ObservationSpec
 from controllers.policies.tensors import safetensors, tensors_of, weights_of
 from pma_gym.files import replace_files
+from pma_gym.paths import as_path
 
 __all__ = ["PolicyError", "PolicyFile", "load_policy_file", "policy_pair", "save_policy_file"]
 
@@ -105,7 +106,7 @@ def policy_pair(path: Path | str) -> tuple[Path, Path]:
     >>> [path.name for path in policy_pair("displacement-62.5hz-ppo")]
     ['displacement-62.5hz-ppo.json', 'displacement-62.5hz-ppo.safetensors']
     """
-    path = Path(path)
+    path = as_path(path, PolicyError)
     name = path.stem if path.suffix in LARGEST_MIB else path.name
     return path.with_name(f"{name}.json"), path.with_name(f"{name}.safetensors")
 

@@ -1,9 +1,9 @@
-"""Command line parsing: strict numbers, and the nearest option to a misspelt one."""
+"""Command line parsing: strict numbers, no empty texts, the nearest option to a misspelt one."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from difflib import get_close_matches
-from typing import Annotated, Any, get_args, get_type_hints
+from typing import Annotated, Any, NoReturn, get_args, get_type_hints
 
 import typer
 from typer.core import TyperCommand, TyperGroup
@@ -15,13 +15,17 @@ JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON instead of 
 
 
 class StrictTyper(typer.Typer):
-    """Typer application with numbers parsed as in files: no `nan`, no `1_000`, no `٣`."""
+    """Typer application with numbers parsed as in files: no `nan`, no `1_000`, no `٣`.
+
+    An empty text is refused for every argument and option: it is what a shell makes of a variable
+    that is not set.
+    """
 
     def __init__(self, **options: Any) -> None:
         super().__init__(**{"cls": _StrictGroup, **options})
 
     def command(self, *names: Any, **options: Any) -> Callable[..., Any]:
-        """Typer's decorator, with strict numbers."""
+        """Typer's decorator, with strict numbers and texts."""
         return super().command(*names, **{"cls": _StrictCommand, **options})
 
 
@@ -66,26 +70,31 @@ def _nearest_option(command: Any) -> Iterator[None]:  # noqa: ANN401
 
 
 def _make_strict(command: Any) -> None:  # noqa: ANN401 - Typer brings its own Click since 0.20
-    """Check the texts of a command's numbers before Python's `int` and `float` read them."""
+    """Check the texts of a command before Python's `int`, `float` and `Path` read them."""
     callback = getattr(command.callback, "__wrapped__", command.callback)
     hints = get_type_hints(callback) if callback else {}
     for param in command.params:
         kinds = {hints.get(param.name), *get_args(hints.get(param.name))}
-        if kinds & {int, float}:
-            param.process_value = _checked(param.process_value, param, whole=int in kinds)
+        numbers = int if int in kinds else float if float in kinds else None
+        param.process_value = _checked(param.process_value, param, numbers)
 
 
-def _checked(process: Callable[..., Any], param: Any, whole: bool) -> Callable[..., Any]:  # noqa: ANN401
+def _checked(process: Callable[..., Any], param: Any, numbers: type | None) -> Callable[..., Any]:  # noqa: ANN401
+    def refuse(ctx: Any, words: str) -> NoReturn:  # noqa: ANN401
+        raise typer.BadParameter(words, ctx=ctx, param=param)
+
     def process_value(ctx: Any, value: Any) -> Any:  # noqa: ANN401
-        for text in value if isinstance(value, list | tuple) else (value,):
-            if isinstance(text, str) and not _is_number(text, whole):
-                kind, example = ("a whole number", "8") if whole else ("a number", "1.5 or 1e-3")
-                raise typer.BadParameter(
-                    f"'{printable(text[:60])}' is not {kind}; write ASCII digits, such as "
-                    f"{example}",
-                    ctx=ctx,
-                    param=param,
+        texts = value if isinstance(value, list | tuple) else (value,)
+        for text in filter(lambda each: isinstance(each, str), texts):
+            if not text.strip() and ctx.get_parameter_source(param.name).name != "DEFAULT":
+                omit = "" if param.required else f", or omit {param.opts[0]}"
+                refuse(ctx, f"it is empty, like a shell variable that is not set; write it{omit}")
+            if numbers and not _is_number(text, whole=numbers is int):
+                kind, example = (
+                    ("a whole number", "8") if numbers is int else ("a number", "1.5 or 1e-3")
                 )
+                came = printable(text[:60])
+                refuse(ctx, f"'{came}' is not {kind}; write ASCII digits, such as {example}")
         return process(ctx, value)
 
     return process_value

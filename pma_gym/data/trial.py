@@ -157,7 +157,13 @@ class Trial:
                 column = BY_QUANTITY.get(quantity)
                 name = column.name if column else quantity
                 # Only voltages have limits, and a volt in a file is a volt inside.
-                check_values(name, values, column, place, "clip the command to that range")
+                check_values(
+                    name,
+                    values,
+                    column,
+                    place,
+                    "give what reached the drive: clip a controller's output, convert counts to V",
+                )
 
     def _measured(self, quantity: str) -> NDArray[np.float64]:
         if quantity not in self.measurements:

@@ -18,7 +18,8 @@ ColumnMap = Mapping[str, str | Mapping[str, object]]
 """A lab's own column names to ours: `{"Weg": "contraction_mm"}`, or with a linear conversion,
 `{"Weg": {"name": "contraction_mm", "factor": -1.0, "offset": 60.0}}`: ours = factor * theirs +
 offset, in the unit of our column. `range`, two numbers in that unit, says where the sensor ends:
-readings there or beyond are not measured. It is what `[columns]` of a `dataset.toml` holds."""
+readings there or beyond are not measured. `limit`, two numbers too, says what a drive takes of a
+command: values beyond are clipped. It is what `[columns]` of a `dataset.toml` holds."""
 
 
 class TrialError(ValueError):
@@ -140,6 +141,8 @@ class Source:
         offset: see factor; in the unit of our column.
         ends: where its sensor ends, in the unit of our column: readings there or beyond are not
             measured; None where that is not known.
+        limit: what a drive takes of a command, in the unit of our column: values beyond are
+            clipped; None for no limit.
     """
 
     index: int
@@ -148,6 +151,7 @@ class Source:
     factor: float = 1.0
     offset: float = 0.0
     ends: tuple[float, float] | None = None
+    limit: tuple[float, float] | None = None
 
 
 def sources(
@@ -197,14 +201,12 @@ def _source(index: int, name: str, mapping: ColumnMap) -> Source | None:
     entry = {"name": entry} if isinstance(entry, str) else entry
     if not isinstance(entry, Mapping):
         raise TrialError(
-            f"[columns] {name!r} must be the name of our column, or a table of name, factor, "
-            f'offset and range, got {reprlib.repr(entry)}; write {name!r} = "contraction_mm"'
+            f"[columns] {name!r} must be the name of our column, or a table of {_ENTRIES}, got "
+            f'{reprlib.repr(entry)}; write {name!r} = "contraction_mm"'
         )
-    extra = set(entry) - {"name", "factor", "offset", "range"}
+    extra = set(entry) - {"name", "factor", "offset", *_PAIRS}
     if extra:
-        raise TrialError(
-            f"[columns] {name!r} takes name, factor, offset and range, got {sorted(extra)[0]!r}"
-        )
+        raise TrialError(f"[columns] {name!r} takes {_ENTRIES}, got {sorted(extra)[0]!r}")
     ours = entry.get("name", name)
     if not isinstance(ours, str) or ours not in BY_NAME:
         raise TrialError(
@@ -217,29 +219,37 @@ def _source(index: int, name: str, mapping: ColumnMap) -> Source | None:
     )
     if factor == 0.0:
         raise TrialError(f"[columns] {name!r} factor must not be 0, or every value is the same")
-    return Source(index, name, BY_NAME[ours], factor, offset, _ends(name, ours, entry.get("range")))
-
-
-def _ends(name: str, ours: str, given: object) -> tuple[float, float] | None:
-    """Where a mapped column's sensor ends."""
     column = BY_NAME[ours]
-    if given is None:
-        return _daq_ends(column)
-    if column.kind != "measurement":
+    ends, limit = (_pair(name, column, key, entry.get(key)) for key in _PAIRS)
+    return Source(index, name, column, factor, offset, ends or _daq_ends(column), limit)
+
+
+_ENTRIES = "name, factor, offset, range and limit"
+_PAIRS = {
+    "range": ("measurement", "where a sensor ends", "the sensor reads"),
+    "limit": ("command", "what a drive takes", "the drive takes"),
+}
+"""Entries of two numbers: of which kind of column, what they are, and who sets them."""
+
+
+def _pair(name: str, column: Column, key: str, entry: object) -> tuple[float, float] | None:
+    """Least and largest value of a mapped column, for its sensor or its drive."""
+    kind, what, whose = _PAIRS[key]
+    if entry is None:
+        return None
+    if column.kind != kind:
         raise TrialError(
-            f"[columns] {name!r} has a range, but {ours} is no measurement; remove range: it is "
-            "where a sensor ends"
+            f"[columns] {name!r} has a {key}, but {column.name} is no {kind}; remove {key}: it is "
+            f"{what}"
         )
-    if not isinstance(given, list | tuple) or len(given) != 2:
+    if not isinstance(entry, list | tuple) or len(entry) != 2:
         raise TrialError(
-            f"[columns] {name!r} range must be two numbers in {column.unit}, the lowest and the "
-            f"highest that the sensor reads, got {reprlib.repr(given)}; write range = [0, 50]"
+            f"[columns] {name!r} {key} must be two numbers in {column.unit}, the lowest and the "
+            f"highest that {whose}, got {reprlib.repr(entry)}; write {key} = [0, 50]"
         )
-    low, high = (_number(f"[columns] {name!r} range", value) for value in given)
+    low, high = (_number(f"[columns] {name!r} {key}", value) for value in entry)
     if low >= high:
-        raise TrialError(
-            f"[columns] {name!r} range must grow, the lowest reading first, got {given!r}"
-        )
+        raise TrialError(f"[columns] {name!r} {key} must grow, the lowest first, got {entry!r}")
     return low, high
 
 

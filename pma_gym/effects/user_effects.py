@@ -28,6 +28,7 @@ from typing import NamedTuple
 
 from pma_gym.effects import CATALOGUE, Effect
 from pma_gym.effects.user_effect_checks import broken_rule, numbers
+from pma_gym.paths import as_path
 
 _HEAD = ("schema", "name", "title", "plant")
 """Keys of a model file that are not effects."""
@@ -58,7 +59,7 @@ def load_effects(path: str | Path) -> list[Effect]:
     Raises:
         OwnEffectError: the file cannot be run or defines no effect, or an effect breaks a rule.
     """
-    path = Path(path).resolve()
+    path = as_path(path, OwnEffectError).resolve()
     try:
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:

@@ -87,7 +87,7 @@ def test_replacing_a_part_keeps_the_rest():
         ({"commands": {"motor_voltage": [1.0]}}, "as long as time, 3 samples, got 1"),
         (
             {"commands": {"motor_voltage": [0.0, 10.5, 11.0]}},
-            "motor_voltage_v must lie in 0-10 V, sample 1 has 10.5; clip the command",
+            "motor_voltage_v must lie in 0-10 V, sample 1 has 10.5; give what reached the drive",
         ),
         (
             {"commands": {"regulator_voltage": [-0.1, 1.0, 1.0]}},

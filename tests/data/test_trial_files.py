@@ -210,8 +210,8 @@ def test_a_mapped_column_that_is_not_there_is_named(tmp_path):
         ),
         (
             GOOD.replace("0.5,1", "0.5,12.4"),
-            "^motor_voltage_v must lie in 0-10 V, row 3 of ramp.csv has 12.4; if the log is in "
-            r"raw DAQ counts, give \[columns\] a factor$",
+            "^motor_voltage_v must lie in 0-10 V, row 3 of ramp.csv has 12.4; if it is a "
+            r"controller's output before its saturation, .*, limit = \[0, 10\] }$",
         ),
         (
             GOOD.replace("40", "inf"),
@@ -263,7 +263,7 @@ def test_readings_at_an_end_of_a_range_are_not_measured(tmp_path):
         ({"a": {"factor": 2.0}}, "'a' must name one of .*, got 'a'"),
         (
             {"a": {"name": "load_n", "scale": 2}},
-            "takes name, factor, offset and range, got 'scale'",
+            "takes name, factor, offset, range and limit, got 'scale'",
         ),
         ({"a": {"name": "load_n", "factor": "2"}}, "'a' factor must be a finite number, got '2'"),
         ({"a": {"name": "load_n", "offset": np.nan}}, "'a' offset must be a finite number, got na"),

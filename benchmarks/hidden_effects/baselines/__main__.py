@@ -22,7 +22,7 @@ TRAINING_SEED = 7001
 @app.command()
 def run(
     cases: Annotated[Path, typer.Option(help="Folder that `draw` or `take` wrote.", exists=True)],
-    baselines: Annotated[str, typer.Option(help="By commas; all if empty.")] = "",
+    baselines: Annotated[str, typer.Option(help="By commas; else all.")] = "",
     jobs: Jobs = 1,
     seed: Annotated[int, typer.Option(help="Of what a baseline draws.")] = 0,
     json_file: Annotated[Path | None, typer.Option("--json", help="Figures to a file.")] = None,

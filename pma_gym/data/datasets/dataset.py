@@ -16,6 +16,7 @@ from pma_gym.data.quality.outliers import outliers
 from pma_gym.data.readers.table import FileFormat, Table
 from pma_gym.data.trial import Trial
 from pma_gym.data.trial_columns import BY_QUANTITY, ColumnMap, TrialError
+from pma_gym.paths import as_path
 from pma_gym.units import SI_FACTORS
 
 __all__ = ["PROPOSED", "Dataset", "NamedTrial", "read_dataset"]
@@ -98,7 +99,7 @@ def read_dataset(folder: str | os.PathLike[str]) -> Dataset:
     Warns:
         TrialWarning: what was passed over, or looks odd.
     """
-    folder = Path(folder)
+    folder = as_path(folder, TrialError)
     files, passed = list_files(folder)
     description = read_description(folder, [path.name for path in files])
     tables, unread = read_files(folder, files, description)

@@ -33,6 +33,7 @@ from pma_gym.data.trial_columns import (
     suggestion,
 )
 from pma_gym.files import OutputError, check_output, replace_file
+from pma_gym.paths import as_path
 
 __all__ = [
     "USUAL_S",
@@ -129,7 +130,7 @@ def check_writable(path: str | os.PathLike[str]) -> None:
     Raises:
         TrialError: unknown suffix, a folder, no such folder, or no leave to write.
     """
-    path = Path(path)
+    path = as_path(path, TrialError)
     if not path.is_dir():
         _written_suffix(path)
     try:
@@ -173,9 +174,8 @@ def write_trial(trial: Trial, path: str | os.PathLike[str]) -> None:
             `pma-gym[files]` is missing.
         OSError: the disk refuses.
     """
-    path = Path(path)
     check_writable(path)
-    replace_file(path, encode_trial(trial, path))
+    replace_file(Path(path), encode_trial(trial, path))
 
 
 def encode_trial(trial: Trial, path: str | os.PathLike[str]) -> bytes:

@@ -20,6 +20,7 @@ from pma_gym.data.readers.table import (
 )
 from pma_gym.data.trial_columns import ColumnMap, TrialError, suggestion
 from pma_gym.limits import LimitError, check_limit
+from pma_gym.paths import as_path
 
 _NEEDED = "a trial needs a header with time_s and a command, and a row for each sample"
 _SHOWN = 5
@@ -42,7 +43,7 @@ def known_suffix(path: Path) -> str:
 
 def split_part(path: str | os.PathLike[str]) -> tuple[Path, str]:
     """A file, and the part of it that a name like `march.xlsx#run2` means; "" for all of it."""
-    whole = Path(path)
+    whole = as_path(path, TrialError)
     text = os.fspath(path)
     name, mark, part = text.partition(PART)
     while mark:
@@ -69,7 +70,7 @@ def load_tables(
     Raises:
         TrialError: no such file, no table, or beyond a limit; names file, rule and fix.
     """
-    path = Path(path)
+    path = as_path(path, TrialError)
     if path.is_dir():
         raise TrialError(f"{path} is a folder; name a file in it")
     read = DECODERS[known_suffix(path)]
@@ -134,7 +135,10 @@ def _with_time(tables: list[Table], request: Request) -> list[Table]:
     if not timed:
         filled = [table for table in tables if table.rows]
         if not filled:
-            raise UnreadableError(f"{tables[0].file} has a header but no rows; {_NEEDED}")
+            cause = " that can be read: " + tables[0].remarks[-1] if tables[0].remarks else ""
+            raise UnreadableError(
+                f"{tables[0].file} has a header but no rows{cause or f'; {_NEEDED}'}"
+            )
         return filled
     said = tuple(
         f"its part {table.part!r} is passed over: "

@@ -16,7 +16,9 @@ from pma_gym.data.readers.units import unit_factor
 from pma_gym.data.trial_checks import check_values
 from pma_gym.data.trial_columns import ColumnMap, Source, TrialError
 
-_COUNTS = "if the log is in raw DAQ counts, give [columns] a factor"
+_FAR_BEYOND, _LITTLE_BEYOND = 10.0, 2.0
+"""Times a column's limit: whole numbers beyond the first are counts; a command up to the second is
+in its unit."""
 
 
 class TrialWarning(UserWarning):
@@ -76,8 +78,10 @@ def file_values(source: Source, table: Table, form: FileFormat, mark: str) -> ND
     check_sentinels(source, theirs, table)
     with np.errstate(over="ignore"):
         values = source.factor * theirs + source.offset
-    check_values(source.column.name, values, source.column, table.place, _COUNTS)
-    return values if source.ends is None else _within(values, source, table)
+    values = _clipped(values, source, table)
+    fix = _beyond_fix(source, theirs, values)
+    check_values(source.column.name, values, source.column, table.place, fix)
+    return _within(values, source, table)
 
 
 def _times(source: Source, table: Table, cells: Cells, mark: str) -> NDArray[np.float64]:
@@ -117,17 +121,66 @@ def _numbers(
     for index, cell in enumerate(cells):
         number = cell_number(cell, mark, grouped)
         if number is None:
+            share = sum(cell_number(each, mark, grouped) is None for each in cells) / len(cells)
             raise TrialError(
-                f"{source.name} must hold numbers, {table.place(index)} has {shown(cell)}; "
-                f"{_fix(source, cell, mark)}"
+                f"{source.name} must hold numbers, {table.place(index)} has {shown(cell)}"
+                f"{_fix(source, cell, mark, share)}"
             )
         theirs[index] = number
     return theirs
 
 
+def _clipped(values: NDArray[np.float64], source: Source, table: Table) -> NDArray[np.float64]:
+    """Values of a command, clipped to what its drive takes."""
+    if source.limit is None:
+        return values
+    low, high = source.limit
+    at = np.flatnonzero(np.isfinite(values) & ((values < low) | (values > high)))
+    if at.size:
+        warn(
+            f"{table.file}: {source.name} lies beyond limit, {low:g} to {high:g} "
+            f"{source.column.unit}, in {at.size} of {values.size} rows, the first row "
+            f"{table.rows[int(at[0])]}; there it is clipped to it"
+        )
+    clipped = values.copy()
+    clipped[at] = np.clip(values[at], low, high)
+    return clipped
+
+
+def _beyond_fix(source: Source, theirs: NDArray[np.float64], values: NDArray[np.float64]) -> str:
+    """What to do about values beyond the limits of their column, by what they look like.
+
+    Whole numbers far beyond are counts, which a factor converts. A command that mostly lies within
+    is a controller's output before its saturation, which a factor would falsify.
+    """
+    column = source.column
+    there = np.isfinite(values)
+    if column.limits is None or not there.any():
+        return ""
+    low, high = column.limits
+    line = f'write under [columns] of dataset.toml "{source.name}" = {{ name = "{column.name}", '
+    factor = f"{line}factor = F }} with the {column.unit} of one unit of the log in place of F"
+    kept = "".join(
+        f"{key} = {value:.12g}, "
+        for key, value, usual in (("factor", source.factor, 1.0), ("offset", source.offset, 0.0))
+        if value != usual
+    )
+    clip = f"log what reached the drive, or clip to it: {line}{kept}limit = [{low:g}, {high:g}] }}"
+    reach = float(np.max(np.abs(values[there]))) / high
+    counts = bool(np.all(theirs[there] == np.rint(theirs[there]))) and reach > _FAR_BEYOND
+    if counts:
+        return f"the log looks like raw DAQ counts: {factor}"
+    if column.kind != "command":
+        return f"if the log is in another unit, {factor}; else correct the reading"
+    if reach <= _LITTLE_BEYOND or np.mean((values >= low) & (values <= high)) >= 0.5:
+        return f"if it is a controller's output before its saturation, {clip}"
+    return f"if it is a controller's output, {clip}; if it is in another unit, {factor}"
+
+
 def _within(values: NDArray[np.float64], source: Source, table: Table) -> NDArray[np.float64]:
     """Values less those at an end of their sensor's range, which say only that it ends there."""
-    assert source.ends is not None
+    if source.ends is None:
+        return values
     low, high = source.ends
     with np.errstate(invalid="ignore"):
         beyond = (values <= low) | (values >= high)
@@ -144,22 +197,29 @@ def _within(values: NDArray[np.float64], source: Source, table: Table) -> NDArra
     return np.where(beyond, np.nan, values)
 
 
-def _fix(source: Source, cell: object, mark: str) -> str:
-    """What to do about a cell that is no number."""
+def _fix(source: Source, cell: object, mark: str, share: float) -> str:
+    """What to do about a cell that is no number, as a share of its column's cells is none."""
     if looks_ambiguous(cell):
         assert isinstance(cell, str)
         comma = "," in cell
         both = ("a decimal comma", "grouped thousands") if comma else ("a point", "groups")
         point, group = ('"."', '","') if comma else ('","', '"."')
         return (
-            f"it may have {both[0]} or {both[1]}; write it without, or, for all files at once, "
+            f"; it may have {both[0]} or {both[1]}; write it without, or, for all files at once, "
             f"write decimal = {group if comma else point} under [format] of dataset.toml for a "
             f"decimal comma, decimal = {point if comma else group} for a decimal point"
         )
     if isinstance(cell, str) and re.fullmatch(r"\s*[+-]?\d*,\d+\s*", cell):
-        return "write it with a decimal point"
+        return "; write it with a decimal point"
     if isinstance(cell, str) and mark == "," and re.fullmatch(r"\s*[+-]?\d*\.\d+\s*", cell):
-        return "write it with a decimal comma, as the other cells, or all of them with a point"
+        return "; write it with a decimal comma, as the other cells, or all of them with a point"
     if source.column.kind == "time":
-        return "give seconds since the start of the trial"
-    return "leave the cell empty where nothing was measured"
+        return (
+            "; give seconds since the start of the trial, or dates and clock times with seconds, "
+            "all of one form"
+        )
+    if isinstance(cell, str) and re.match(r"[^A-Za-z#]*\d", cell):
+        return f"; it looks like a reading: write the number alone, in {source.column.unit}"
+    if 2 * share > 1:
+        return ", as have most of its cells: the column holds no numbers; remove or rename it"
+    return "; leave the cell empty where nothing was measured"

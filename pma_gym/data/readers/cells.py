@@ -1,4 +1,4 @@
-"""Cells to numbers: decimal marks, grouped thousands, words for "not measured"."""
+"""Cells to numbers: signs, decimal marks, grouped thousands, words for "not measured"."""
 
 import math
 import re
@@ -24,6 +24,14 @@ _DECIMAL = {
 }
 _LONGEST = 100
 """Characters of the longest cell that is looked at for marks."""
+_MINUS = str.maketrans(dict.fromkeys("\u2212\u2010\u2011\u2012\u2013\ufe63\uff0d", "-"))
+"""Signs that a locale or a word processor writes for a minus."""
+
+
+def bare_text(cell: str) -> str:
+    """The text of a cell without blanks around it, every minus as ASCII's."""
+    bare = cell.strip()
+    return bare if bare.isascii() else bare.translate(_MINUS)
 
 
 def decimal_mark(columns: Iterable[Cells]) -> str:
@@ -42,7 +50,7 @@ def decimal_mark(columns: Iterable[Cells]) -> str:
         for cell in cells:
             if not isinstance(cell, str) or len(cell) > _LONGEST:
                 continue
-            bare = cell.strip()
+            bare = bare_text(cell)
             if "." in bare and _DECIMAL["."].fullmatch(bare) and not _GROUPS[","].fullmatch(bare):
                 return "."
             if "," in bare and "." in bare and _GROUPS["."].fullmatch(bare):
@@ -66,7 +74,7 @@ def has_groups(cells: Cells, mark: str, given: bool = False) -> bool:
     other = "," if mark == "." else "."
     for cell in cells:
         if isinstance(cell, str) and other in cell and len(cell) <= _LONGEST:
-            bare = cell.strip()
+            bare = bare_text(cell)
             sure = given or mark in bare or bare.count(other) > 1
             if sure and _GROUPS[mark].fullmatch(bare):
                 return True
@@ -89,10 +97,10 @@ def cell_number(cell: object, mark: str = ".", grouped: bool = False) -> float |
     """
     if not isinstance(cell, str):
         return _object_number(cell)
-    plain = parse_number(cell)
+    bare = bare_text(cell)
+    plain = parse_number(bare)
     if plain is not None and (mark == "." or "." not in cell):
         return plain
-    bare = cell.strip()
     if bare.lower() in NOT_MEASURED:
         return math.nan
     return None if len(bare) > _LONGEST else _marked(bare, mark, grouped)
@@ -125,5 +133,5 @@ def _object_number(cell: object) -> float | None:
 
 def looks_ambiguous(cell: object) -> bool:
     """Whether a cell's comma or point may be a decimal mark or group thousands: `3,785`."""
-    bare = cell.strip() if isinstance(cell, str) and len(cell) <= _LONGEST else ""
+    bare = bare_text(cell) if isinstance(cell, str) and len(cell) <= _LONGEST else ""
     return any(groups.fullmatch(bare) is not None for groups in _GROUPS.values())

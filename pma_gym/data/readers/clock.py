@@ -3,6 +3,7 @@
 import datetime
 import re
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +14,8 @@ from pma_gym.data.readers.table import Cells
 _NS = 1_000_000_000
 _DAY_NS = 86_400 * _NS
 _CLOCK = (
-    r"(?P<h>[0-9]{1,2}):(?P<m>[0-9]{2}):(?P<s>[0-9]{2})(?:[.,](?P<f>[0-9]{1,9}))?"
+    r"(?P<h>[0-9]{1,2}):(?P<m>[0-9]{2}):(?P<s>[0-9]{2})"
+    r"(?:[.,](?P<f>[0-9]{1,9})|:(?P<ms>[0-9]{3}))?"
     r"(?: ?(?P<half>[AaPp])\.?[Mm]\.?)?(?: ?(?P<zone>Z|UTC|[+-][0-9]{2}:?[0-9]{2}))?"
 )
 _YEAR_FIRST = re.compile(
@@ -27,6 +29,12 @@ _MONTH_NAMED = re.compile(
     rf"(?P<d>[0-9]{{1,2}})[- ](?P<name>[A-Za-z]{{3}})[- ](?P<y>[0-9]{{4}}),? +{_CLOCK}"
 )
 _TIME_ONLY = re.compile(_CLOCK)
+_DURATION = re.compile(
+    r"(?:(?P<d>[0-9]{1,4}) days?,? )?(?:(?P<h>[0-9]{1,4}):)?"
+    r"(?P<m>[0-9]{1,3}):(?P<s>[0-9]{2})(?:[.,](?P<f>[0-9]{1,9}))?"
+)
+"""`00:00.010`, `26:00:00` and `0 days 00:00:00.010`; without a fraction or hours, `10:30` may be
+hours and minutes."""
 _COUNTED = re.compile(r"([+-]?[0-9.,eE+-]+) ?(sec|s|seconds|ms|min|hr)")
 _UNITS = {"sec": 1.0, "s": 1.0, "seconds": 1.0, "ms": 1e-3, "min": 60.0, "hr": 3600.0}
 _MONTHS: list[str] = list("jan feb mar apr may jun jul aug sep oct nov dec".split())
@@ -96,7 +104,7 @@ def _objects(cells: Cells) -> list[int | None] | None:
             stamps.append(seconds * _NS + cell.microsecond * 1000)
         elif isinstance(cell, datetime.timedelta):
             stamps.append(_of_delta(cell))
-    return _past_midnight(stamps) if isinstance(_first(cells), datetime.time) else stamps
+    return _past_end(stamps, _DAY_NS) if isinstance(_first(cells), datetime.time) else stamps
 
 
 def _first(cells: Cells) -> object:
@@ -118,10 +126,8 @@ def _texts(cells: Cells) -> list[int | None] | None:
             continue
         matches = [_match(form, cell) if cell else None for cell in bare]
         if sum(match is not None for match in matches) == len(filled):
-            try:
+            with suppress(ValueError):
                 return read(matches)
-            except ValueError:
-                return None
     return None
 
 
@@ -146,7 +152,7 @@ def _clock(match: re.Match[str]) -> int:
     zone, shift = match["zone"], 0
     if zone and zone not in ("Z", "UTC"):
         shift = (int(zone[1:3]) * 60 + int(zone[-2:])) * (-60 if zone[0] == "-" else 60)
-    fraction = int((match["f"] or "0").ljust(9, "0"))
+    fraction = int((match["f"] or match["ms"] or "0").ljust(9, "0"))
     return ((hours * 60 + minutes) * 60 + seconds - shift) * _NS + fraction
 
 
@@ -185,20 +191,37 @@ def _year_last(matches: _Matches) -> list[int | None]:
 
 
 def _time_only(matches: _Matches) -> list[int | None]:
-    return _past_midnight([m and _clock(m) for m in matches])
+    return _past_end([m and _clock(m) for m in matches], _DAY_NS)
 
 
-def _past_midnight(stamps: list[int | None]) -> list[int | None]:
-    """Times of day that go on after midnight: a step back by over half a day is the next day."""
-    days, before, out = 0, None, []
+def _past_end(stamps: list[int | None], period: int) -> list[int | None]:
+    """Times that begin at 0 again after a day or an hour: a step back by over half of it does."""
+    periods, before, out = 0, None, []
     for stamp in stamps:
         if stamp is not None:
-            if before is not None and stamp < before - _DAY_NS // 2:
-                days += 1
+            if before is not None and stamp < before - period // 2:
+                periods += 1
             before = stamp
-            stamp += days * _DAY_NS
+            stamp += periods * period
         out.append(stamp)
     return out
+
+
+def _durations(matches: _Matches) -> list[int | None]:
+    """Time since a start; minutes without hours begin again after an hour."""
+    hours = any(m and m["h"] for m in matches)
+    if not hours and not any(m and m["f"] for m in matches):
+        raise ValueError("hours and minutes, or minutes and seconds")
+    stamps = [m and _duration(m) for m in matches]
+    return stamps if hours else _past_end(stamps, 3600 * _NS)
+
+
+def _duration(match: re.Match[str]) -> int:
+    days, hours, minutes, seconds = (int(match[name] or 0) for name in "dhms")
+    if seconds > 59 or (match["h"] and minutes > 59):
+        raise ValueError("no duration")
+    whole = ((days * 24 + hours) * 60 + minutes) * 60 + seconds
+    return whole * _NS + int((match["f"] or "0").ljust(9, "0"))
 
 
 def _counted(matches: _Matches) -> list[int | None]:
@@ -220,5 +243,6 @@ _FORMS: dict[re.Pattern[str], Callable[[_Matches], list[int | None]]] = {
     _MONTH_NAMED: _month_named,
     _YEAR_LAST: _year_last,
     _TIME_ONLY: _time_only,
+    _DURATION: _durations,
     _COUNTED: _counted,
 }

@@ -20,8 +20,13 @@ _MANY = 0.4
 """Share of zeros at every other byte from which a text is UTF-16: Latin letters and digits."""
 
 
-def decode_text(content: bytes, file: str, encoding: str | None = None) -> str:
+def decode_text(
+    content: bytes, file: str, encoding: str | None = None
+) -> tuple[str, tuple[str, ...]]:
     """Text of a file.
+
+    Zero bytes at its end are what a file system leaves that lost its power: they are passed over,
+    and so is a row before them whose end was not written.
 
     Args:
         content: its bytes.
@@ -29,7 +34,7 @@ def decode_text(content: bytes, file: str, encoding: str | None = None) -> str:
         encoding: which encoding to take; None: by mark, else by content. Text that is no UTF-8 is
             read as Windows-1252, in which every byte of a number is what it is in ASCII.
     Returns:
-        The text, without a byte order mark.
+        The text, without a byte order mark, and remarks on what was passed over.
     Raises:
         UnreadableError: bytes that are no text, or not of that encoding.
         TrialError: no such encoding.
@@ -40,6 +45,10 @@ def decode_text(content: bytes, file: str, encoding: str | None = None) -> str:
         mark, encoding = next(((m, name) for m, name in _MARKS if content.startswith(m)), (b"", ""))
         content = content[len(mark) :]
         encoding = encoding or _guess(content)
+    wide = 4 if "32" in encoding else 2 if "16" in encoding else 1
+    # Zeros may end within a character of UTF-16.
+    missing = -len(content) % wide if content.endswith(b"\0") else 0
+    content += bytes(missing)
     try:
         text = content.decode(encoding)
     except UnicodeError as error:
@@ -50,16 +59,31 @@ def decode_text(content: bytes, file: str, encoding: str | None = None) -> str:
         raise TrialError(
             f"{encoding!r} is no encoding of text; give another, for example 'cp1252'"
         ) from None
-    if "\0" in text:
+    text = text.removeprefix("\ufeff")
+    whole = text.rstrip("\0")
+    zeros, at = text.count("\0") * wide - missing, text.find("\0")
+    if 0 <= at < max(len(whole), 1):
         raise UnreadableError(
-            f"{file} is no text file, it holds zero bytes; save it as 'CSV UTF-8'"
+            f"{file} holds {zeros} zero bytes, the first in row {_rows(text[:at] + '-')}: it is no "
+            "text there; remove them, or save it as 'CSV UTF-8'"
         )
-    return text.removeprefix("\ufeff")
+    if not zeros:
+        return whole, ()
+    said = f"{zeros} zero bytes behind row {_rows(whole)}, as a loss of power leaves them, are "
+    if whole.endswith(("\n", "\r")):
+        return whole, (f"{said}passed over",)
+    last = max(whole.rfind("\n"), whole.rfind("\r"))
+    return whole[: last + 1], (f"{said}passed over, and so is that row, whose end is missing",)
+
+
+def _rows(text: str) -> int:
+    """How many rows a text has."""
+    return max(text.count("\n"), text.count("\r")) + (not text.endswith(("\n", "\r")))
 
 
 def _guess(content: bytes) -> str:
     """Encoding of bytes without a mark."""
-    sample = content[:_SAMPLE]
+    sample = content.rstrip(b"\0")[:_SAMPLE]
     even, odd = sample[::2].count(0), sample[1::2].count(0)
     if odd >= _MANY * (len(sample) / 2) > 0 and not even:
         return "utf-16-le"

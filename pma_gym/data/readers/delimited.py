@@ -4,6 +4,7 @@ import csv
 import re
 from collections import Counter
 from collections.abc import Sequence
+from dataclasses import replace
 
 from pma_gym.data.readers import labview
 from pma_gym.data.readers.decoding import decode_text
@@ -38,10 +39,13 @@ def read_text(content: bytes, file: str, request: Request = Request()) -> list[T
     Raises:
         TrialError: bytes that are no text, or rows that are no table.
     """
-    text = decode_text(content, file, request.format.encoding)
-    if labview.is_labview(text):
-        return labview.read_labview(text, file, request)
-    return [arrange(file, split_rows(text, file, request), request)]
+    text, remarks = decode_text(content, file, request.format.encoding)
+    tables = (
+        labview.read_labview(text, file, request)
+        if labview.is_labview(text)
+        else [arrange(file, split_rows(text, file, request), request)]
+    )
+    return [replace(tables[0], remarks=(*remarks, *tables[0].remarks)), *tables[1:]]
 
 
 def split_rows(text: str, file: str, request: Request) -> list[Row]:

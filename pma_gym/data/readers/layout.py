@@ -4,6 +4,7 @@ import datetime
 import re
 from collections.abc import Mapping, Sequence
 
+from pma_gym.data.readers.cells import bare_text
 from pma_gym.data.readers.clock import looks_like_clock
 from pma_gym.data.readers.table import NoHeaderError, Request, Table, shown
 from pma_gym.data.readers.units import unit_of
@@ -58,13 +59,16 @@ def arrange(
     if top:
         remarks.append(f"{_span(top)} above the header {_are(top)} passed over")
     first = next((i for i in range(at + 1, len(rows)) if _is_sample(rows[i][1])), len(rows))
-    units, said = _units(rows[at + 1 : first], len(header))
-    remarks += said
+    units, others = _units(rows[at + 1 : first], len(header))
     time = next((i for i, name in enumerate(header) if request.is_time(name)), 0)
     last = len(rows)
     while last > first and not _may_be_sample(rows[last - 1][1], time):
         last -= 1
-    if rows[last:]:
+    if first == last and (others or rows[last:]):
+        remarks = [_unread((others or rows[last:])[0], header, time)]
+    elif others:
+        remarks.append(f"{_span(others)} below the header {_are(others)} passed over")
+    if first < last < len(rows):
         remarks.append(f"{_span(rows[last:])} below the samples {_are(rows[last:])} passed over")
     samples = rows[first:last]
     check_limit(file, "cells", len(samples) * len(header))
@@ -95,9 +99,9 @@ def _filled(cell: object) -> bool:
 def _is_number(cell: object) -> bool:
     """Whether a cell is a number, a date, or a text that is meant as one."""
     if isinstance(cell, str):
-        bare = cell.strip()
-        if len(bare) > _LONGEST:
+        if len(cell) > _LONGEST:
             return False
+        bare = bare_text(cell)
         return _NUMBER.fullmatch(bare) is not None or looks_like_clock(bare)
     kinds = int | float | datetime.datetime | datetime.time | datetime.timedelta
     return isinstance(cell, kinds) and not isinstance(cell, bool)
@@ -198,8 +202,20 @@ def _no_header(file: str, row: Row) -> TrialError:
     )
 
 
-def _units(rows: Sequence[Row], width: int) -> tuple[dict[int, str], list[str]]:
-    """Units by column of the rows between header and samples; other rows are remarked."""
+def _unread(row: Row, header: Sequence[str], time: int) -> str:
+    """Which cell of the first row below the header keeps it from being a sample, and why."""
+    number, cells = row
+    filled = [i for i, cell in enumerate(cells) if _filled(cell)]
+    at = time if time in filled and not _is_number(cells[time]) else filled[0]
+    name = f", column {header[at]!r}," if at < len(header) else ""
+    return (
+        f"row {number}{name} has {shown(_text(cells[at]))}, which is no number, no date and no "
+        "clock time; write decimal numbers below the header (for the time, in seconds)"
+    )
+
+
+def _units(rows: Sequence[Row], width: int) -> tuple[dict[int, str], list[Row]]:
+    """Units by column of the rows between header and samples, and the other rows there."""
     units: dict[int, str] = {}
     others: list[Row] = []
     for row in rows:
@@ -209,8 +225,7 @@ def _units(rows: Sequence[Row], width: int) -> tuple[dict[int, str], list[str]]:
             units = filled
         else:
             others.append(row)
-    said = [f"{_span(others)} below the header {_are(others)} passed over"] if others else []
-    return units, said
+    return units, others
 
 
 def _check_rows(file: str, samples: Sequence[Row], header: Sequence[str], padded: bool) -> None:

@@ -257,6 +257,12 @@ def _set(*path_and_value):
         (_set("view", "kind", "camera"), "view: view kind must be one of tracking, environment"),
         (_set("view", "more", 1), "view: a view has kind, preview and history; check more"),
         (_set("form", "kind", "torque"), "form: form kind must be one of direct, increment, res"),
+        (
+            lambda words: words.update(
+                form={"kind": "residual", "authority_v": 0.3, "base": {"a": "pid"}}
+            ),
+            r"form: a residual names its base, a text, .* with base \{'a': 'pid'\}",
+        ),
         (_set("form", "authority_v", "5"), "form: form authority_v must be a number"),
         (_set("observation", 0, ["one"]), r"observation must be a list of \[entry, what 1.0"),
         (_set("observation", []), "observation must have a row for each of the 12 entries"),

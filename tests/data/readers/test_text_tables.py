@@ -74,7 +74,81 @@ def test_an_encoding_is_given_where_none_can_be_told(tmp_path):
     form = FileFormat(encoding="koi8-r")
     check(read_trial(save(tmp_path, content), {"Сила": "load_n"}, form))
     assert "is not utf-8 text (byte" in refused(tmp_path, content, FileFormat(encoding="utf-8"))
-    assert "it holds zero bytes" in refused(tmp_path, text().replace("40", "\0") * 9)
+    message = refused(tmp_path, text().replace("40", "\0", 1))
+    assert "ramp.csv holds 1 zero bytes, the first in row 2: it is no text there" in message
+    check(read_trial(save(tmp_path, text())))
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-16", "utf-16-le", "utf-16-be", "utf-32"])
+@pytest.mark.parametrize("count", [1, 512, 513])
+def test_zero_bytes_of_a_power_cut_are_passed_over_and_counted(tmp_path, encoding, count):
+    content = text().encode(encoding) + b"\0" * count
+    with pytest.warns(TrialWarning, match=f"{count} zero bytes behind row {ROWS + 1}, as a loss"):
+        check(read_trial(save(tmp_path, content)))
+
+
+def test_a_row_that_a_power_cut_ended_early_is_passed_over(tmp_path):
+    content = (text() + "0.8,1.97").encode() + b"\0" * 9
+    with pytest.warns(TrialWarning, match=f"9 zero bytes behind row {ROWS + 2}.*so is that row"):
+        check(read_trial(save(tmp_path, content)))
+    assert "9 zero bytes, the first in row 1" in refused(tmp_path, b"\0" * 9)
+
+
+@pytest.mark.parametrize("minus", "\u2212\u2010\u2011\u2012\u2013\ufe63\uff0d")
+@pytest.mark.parametrize(("separator", "decimal"), [(",", "."), (";", ",")])
+def test_every_minus_is_one(tmp_path, minus, separator, decimal):
+    content = text(separator, decimal).replace(f"{separator}1{decimal}5\n", f"{separator}-1e-2\n")
+    assert read_trial(save(tmp_path, content.replace("-", minus))).measurements["load"][0] == -0.01
+
+
+def test_nothing_but_a_minus_is_no_number(tmp_path):
+    message = refused(tmp_path, text().replace(",1.5\n", ",\u2212\n"))
+    assert "has '\u2212'; leave the cell empty" in message
+
+
+@pytest.mark.parametrize("reading", ["25.3 mm", "(15.0)", "0x1F", "<0.1", "1e400", "1.5*"])
+def test_a_reading_in_another_form_is_not_to_be_emptied(tmp_path, reading):
+    message = refused(tmp_path, text().replace(",1.5\n", f",{reading}\n"))
+    assert message.endswith("it looks like a reading: write the number alone, in N")
+
+
+def test_a_column_of_words_is_not_to_be_emptied(tmp_path):
+    rows = [lines()[0], *(f"{row.rpartition(',')[0]},low" for row in lines()[1:])]
+    assert "the column holds no numbers; remove or rename it" in refused(tmp_path, "\n".join(rows))
+
+
+def test_where_no_row_can_be_read_the_first_cell_and_the_reason_are_named(tmp_path):
+    rows = [row.replace(".", "·") for row in lines()]
+    message = refused(tmp_path, "\n".join(rows))
+    assert "rows that can be read: row 2, column 'time_s', has '0·0', which is no number" in message
+    stamps = [rows[0], *(f"10:{k:02},1,2,3" for k in range(9))]
+    assert "clock times with seconds" in refused(tmp_path, "\n".join(stamps))
+
+
+@pytest.mark.parametrize("factor", [1.0, 1.3])
+def test_a_command_beyond_its_drive_is_clipped_by_the_line_of_the_message(tmp_path, factor):
+    theirs = 13 / factor * np.sin(8 * TIME) ** 4
+    rows = [f"{t},{v!r},{40 - t}" for t, v in zip(TIME, theirs.tolist(), strict=True)]
+    content = "\n".join(["time_s,u,contraction_mm", *rows])
+    entry = {"u": {"name": "motor_voltage_v", "factor": factor}}
+    message = refused(tmp_path, content, columns=entry)
+    assert "before its saturation" in message and "in place of F" not in message
+    (tmp_path / "dataset.toml").write_text("[columns]\n" + message.partition("toml ")[2])
+    with pytest.warns(TrialWarning, match="u lies beyond limit, 0 to 10 V, in .* it is clipped"):
+        (trial,) = read_dataset(tmp_path).trials
+    assert_allclose(trial.trial.commands["motor_voltage"], np.clip(factor * theirs, 0, 10))
+
+
+def test_counts_of_a_converter_get_a_factor_and_no_limit(tmp_path):
+    counts = [f"{t},{v},{40 - t}" for t, v in zip(TIME, range(0, 4000, 100), strict=True)]
+    message = refused(tmp_path, "\n".join([",".join(HEADER[:3]), *counts]))
+    assert "looks like raw DAQ counts" in message and "limit" not in message
+    line = message.partition("toml ")[2].partition(" with")[0].replace("F", "0.0025")
+    (tmp_path / "dataset.toml").write_text(f"[columns]\n{line}")
+    assert read_dataset(tmp_path).trials[0].trial.commands["motor_voltage"][-1] == 9.75
+    percent = [f"{t},{100 * t / 0.78 + 0.5!r},40" for t in TIME.tolist()]
+    both = refused(tmp_path, "\n".join([",".join(HEADER[:3]), *percent]))
+    assert "if it is a controller's output" in both and "if it is in another unit" in both
 
 
 @pytest.mark.parametrize(
@@ -286,6 +360,10 @@ STAMPS = {
     "same day": lambda s: f"3/1/2026 10:11:{12 + s:06.3f} AM",
     "MATLAB": lambda s: f"01-Mar-2026 10:11:{12 + s:06.3f}",
     "clock": lambda s: f"10:11:{12 + s:06.3f}",
+    "minutes": lambda s: f"{'59' if s < 0.5 else '00'}:{(59.5 + s) % 60:06.3f}",
+    "hours": lambda s: f"26:00:{s:06.3f}",
+    "pandas": lambda s: f"0 days 00:00:{s:09.6f}",
+    "milliseconds": lambda s: f"10:11:{12 + s:06.3f}".replace(".", ":"),
     "midnight": lambda s: f"{'23:59' if s < 0.5 else '00:00'}:{(59.5 + s) % 60:06.3f}",
     "duration": lambda s: f"{s:.4g} sec",
     "epoch": lambda s: f"{1772359872 + s:.3f}",
