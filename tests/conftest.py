@@ -1,6 +1,9 @@
 import os
 
+import pytest
 from hypothesis import settings
+
+from pma_gym.effects import CATALOGUE, user_effects
 
 # Drawing needs no screen. Set before pygame or matplotlib is first imported.
 os.environ.setdefault("SDL_VIDEODRIVER", "dummy")
@@ -17,3 +20,20 @@ for _threads in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
 settings.register_profile("search", deadline=None)
 settings.register_profile("pma_gym", deadline=None, derandomize=True)
 settings.load_profile("pma_gym")
+
+
+@pytest.fixture
+def forget_user_effects(monkeypatch):
+    """Return a function that takes out the effects that users' files added; called at the end."""
+    monkeypatch.delenv(user_effects.NAMED, raising=False)
+    shipped = dict(CATALOGUE)
+
+    def forget():
+        CATALOGUE.clear()
+        CATALOGUE.update(shipped)
+        user_effects._sources.clear()
+        user_effects._named = ""
+        os.environ.pop(user_effects.NAMED, None)
+
+    yield forget
+    forget()

@@ -3,7 +3,6 @@
 import json
 import sys
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -233,15 +232,6 @@ def test_warnings_of_the_data_set_are_said(run, engine, tmp_path):
     code, _, err = run("diagnose", "lab")
     assert code == 0
     assert err.startswith("warning: ramp.csv: unknown columns are ignored: 'Temp'\n")
-
-
-def test_effects_of_ones_own_are_loaded_before_the_model(run, engine, tmp_path, monkeypatch):
-    loaded = []
-    own = SimpleNamespace(load_effects=loaded.append)
-    monkeypatch.setitem(sys.modules, "pma_gym.effects.user_effects", own)
-    code, _, _ = run("diagnose", "lab", "--effect", "a.py", "--effect", "b.py")
-    assert code == 0
-    assert [path.name for path in loaded] == ["a.py", "b.py"]
 
 
 @pytest.mark.parametrize("command", ["diagnose", "fit"])

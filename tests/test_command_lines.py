@@ -21,6 +21,7 @@ from pma_gym.cli.terminal import print_json
 from pma_gym.data.datasets.dataset import read_dataset
 from pma_gym.data.files.trial_files import read_trial, write_trial
 from pma_gym.effects.user_effects import load_effects
+from pma_gym.plant.model import dump_model
 from pma_gym.tasks import EVERY_TASK
 
 SCREEN = 24
@@ -28,7 +29,94 @@ PROGRAMS = {"pma-gym": pma_gym.cli.app, "python -m benchmarks": benchmarks.__mai
 GROUPS = {name: typer.main.get_command(app) for name, app in PROGRAMS.items()}
 COMMANDS = [(program, name) for program, group in GROUPS.items() for name in group.commands]
 # It lists what it does without a command, and two dozen commands.
-LONG = {"python -m benchmarks": 40}
+LONG = {"python -m benchmarks": 41}
+
+
+WITH_MODEL = [
+    (program, name)
+    for program, group in GROUPS.items()
+    for name, command in [("", group), *group.commands.items()]
+    if any("--model" in param.opts for param in command.params)
+]
+OWN = """
+from typing import Annotated, NamedTuple
+from pma_gym.effects import Effect
+from pma_gym.units import Quantity
+
+class Toe(NamedTuple):
+    force: Annotated[float, Quantity("N", 0, 100, "assumption: 5", 0.0, usual=5.0)]
+
+def toe(contraction, p):
+    return p.force * contraction
+
+TOE = Effect("toe", "muscle_force", Toe, toe)
+"""
+
+
+@pytest.fixture
+def lab(tmp_path, forget_user_effects):
+    """A folder with an effect in toe.py, a station with it in toe.toml, and a data set."""
+    (tmp_path / "toe.py").write_text(OWN)
+    load_effects(tmp_path / "toe.py")
+    model = pma_gym.load_model("station").with_effects({"toe": {"force_n": 5.0}}, name="toe")
+    (tmp_path / "toe.toml").write_text(dump_model(model))
+    time = np.arange(40) / 20.0
+    asked = pma_gym.Trial(time, {"motor_voltage": time, "regulator_voltage": 0 * time + 5.0})
+    (tmp_path / "lab").mkdir()
+    write_trial(pma_gym.Plant(model).simulate(asked), tmp_path / "lab" / "trial.csv")
+    forget_user_effects()
+    return tmp_path
+
+
+FAST = {
+    "simulate": ["lab/trial.csv", "--out", "x.csv"],
+    "info": [],
+    "convert": ["lab"],
+    "diagnose": ["lab"],
+    "fit": ["lab"],
+    "compare": ["lab"],
+    "watch": ["--video", "x.gif"],
+    "": ["--controllers", "pid", "--out", "job", "--jobs", "1"],
+    "voltages": [
+        *("--controller", "serres_feedforward", "--task", "displacement"),
+        *("--pressure", "300", "--out", "v.csv"),
+    ],
+    "tune": ["--out", "gains.json"],
+}
+"""Arguments of every command with --model."""
+
+SLOW = {
+    "pma_gym.discovery.diagnose": lambda trials, model, **rest: _stop(model),
+    "pma_gym.discovery.refit": lambda trials, model, **rest: _stop(model),
+    "pma_gym.envs.PMAEnv.picture": lambda env: _stop(env.station.model),
+    "benchmarks.reproduction.job.run_job": lambda suite, *rest: _stop(suite.nominal_of(0)),
+    "benchmarks.tuning.tune.run_tune": lambda out, seed, model, *rest: _stop(
+        pma_gym.load_model(model)
+    ),
+}
+"""What takes long of these commands, replaced by a check of the model that it receives."""
+
+
+def _stop(model):
+    assert "toe" in model.parameters
+    raise ValueError("stopped")
+
+
+@pytest.mark.parametrize(("program", "command"), WITH_MODEL)
+def test_a_command_with_a_model_takes_the_effects_of_a_user(program, command, lab, monkeypatch):
+    monkeypatch.chdir(lab)
+    for name, check in SLOW.items():
+        monkeypatch.setattr(name, check)
+    asked = [*filter(None, [command]), *FAST[command], "--model", "toe.toml"]
+
+    def said(*others):
+        done = CliRunner().invoke(PROGRAMS[program], [*asked, *others])
+        return f"{done.output} {done.exception}"
+
+    assert "unknown effect [toe]" in said()
+    after = said("--effect", "toe.py")
+    assert after.endswith(" None") or "stopped" in after
+    assert os.environ["PMA_GYM_EFFECTS"] == str(lab / "toe.py")
 
 
 @pytest.fixture

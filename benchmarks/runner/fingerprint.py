@@ -8,6 +8,7 @@ from pathlib import Path
 
 from benchmarks.runner.controller_spec import ControllerSpec
 from benchmarks.suites.suite import FrozenSuite
+from pma_gym.effects.user_effects import loaded_digest
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -56,10 +57,11 @@ def key(suite: FrozenSuite, spec: ControllerSpec) -> str:
 
 @cache
 def code_digest() -> str:
-    """Digest of the repository's code and of the packages' versions."""
+    """Digest of the repository's code, of the packages' versions and of the user's effects."""
     files = sorted(path for pattern in SOURCES for path in ROOT.glob(pattern))
     versions = [f"{name} {_version(name)}" for name in PACKAGES]
-    return hashlib.sha256("\n".join([digest_of(files), *versions]).encode()).hexdigest()[:16]
+    parts = [digest_of(files), *versions, *filter(None, [loaded_digest()])]
+    return hashlib.sha256("\n".join(parts).encode()).hexdigest()[:16]
 
 
 def code_digest_with(files: Sequence[Path]) -> str:

@@ -54,9 +54,6 @@ OutOption = Annotated[
 ]
 SeedOption = Annotated[int, typer.Option(min=0, help="Seed of chance.")]
 JobsOption = Annotated[int, typer.Option(min=1, help="How many cores to use.")]
-EffectOption = Annotated[
-    list[Path] | None, typer.Option(help="Python file with effects of your own; may be repeated.")
-]
 ChecksOption = Annotated[
     bool,
     typer.Option(help="Stop where a unit is certainly wrong; else only warn."),
@@ -70,7 +67,6 @@ def diagnose(
     out: OutOption = None,
     seed: SeedOption = 0,
     jobs: JobsOption = 1,
-    effect: EffectOption = None,
     checks: ChecksOption = True,
     resume: Annotated[
         bool, typer.Option("--resume", help="Go on with a run that was interrupted.")
@@ -85,7 +81,7 @@ def diagnose(
     )
     _check_apart(results, dataset)
     results.check(force, resume)
-    trials, given = _inputs(dataset, model, effect, checks)
+    trials, given = _inputs(dataset, model, checks)
     from pma_gym import discovery
     from pma_gym.discovery.experiments.command_file import proposed_file
     from pma_gym.discovery.fitting.trial_states import dump_states
@@ -120,7 +116,6 @@ def fit(
     out: OutOption = None,
     seed: SeedOption = 0,
     jobs: JobsOption = 1,
-    effect: EffectOption = None,
     checks: ChecksOption = True,
     force: ForceOption = False,
     as_json: JsonOption = False,
@@ -129,7 +124,7 @@ def fit(
     results = Results(out or _default(dataset, "fit"), ("model.toml", "trials.toml", "fit.json"))
     _check_apart(results, dataset)
     results.check(force)
-    trials, given = _inputs(dataset, model, effect, checks)
+    trials, given = _inputs(dataset, model, checks)
     from pma_gym import discovery
     from pma_gym.discovery.fitting.trial_states import dump_states
 
@@ -168,16 +163,10 @@ def _check_apart(results: Results, dataset: Path) -> None:
         )
 
 
-def _inputs(
-    folder: Path, model: str | None, effects: list[Path] | None, checks: bool
-) -> tuple[Dataset, Model]:
+def _inputs(folder: Path, model: str | None, checks: bool) -> tuple[Dataset, Model]:
     """The data set and the model, all that can be refused before anything is fitted."""
     with warnings_said():
         trials = read_dataset(folder)
-    for path in effects or ():
-        from pma_gym.effects.user_effects import load_effects
-
-        load_effects(path)
     given = load_model(model or trials.model or DEFAULT_MODEL)
     if given.rig.is_diagnosable:
         from pma_gym.discovery.preparation.data_checks import check_dataset

@@ -1,8 +1,11 @@
-"""Command line parsing: strict numbers, no empty texts, the nearest option to a misspelt one."""
+"""Command line parsing: strict numbers, no empty texts, the nearest option, and `--effect`."""
 
+import inspect
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from difflib import get_close_matches
+from functools import wraps
+from pathlib import Path
 from typing import Annotated, Any, NoReturn, get_args, get_type_hints
 
 import typer
@@ -11,7 +14,15 @@ from typer.core import TyperCommand, TyperGroup
 from pma_gym.numerals import parse_number
 from pma_gym.printable import printable
 
+_Option = type(typer.Option())
+
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON instead of tables.")]
+
+
+EffectOption = Annotated[
+    list[Path] | None,
+    typer.Option(metavar="FILE", help="Your file of effects; repeatable."),
+]
 
 
 class StrictTyper(typer.Typer):
@@ -19,14 +30,48 @@ class StrictTyper(typer.Typer):
 
     An empty text is refused for every argument and option: it is what a shell makes of a variable
     that is not set.
+
+    A command, or the program, with the option `--model` also has `--effect`, and runs its files
+    before anything else.
     """
 
     def __init__(self, **options: Any) -> None:
         super().__init__(**{"cls": _StrictGroup, **options})
 
     def command(self, *names: Any, **options: Any) -> Callable[..., Any]:
-        """Typer's decorator, with strict numbers and texts."""
-        return super().command(*names, **{"cls": _StrictCommand, **options})
+        """Typer's decorator, with strict numbers and texts, and `--effect`."""
+        register = super().command(*names, **{"cls": _StrictCommand, **options})
+        return lambda function: register(_with_effects(function))
+
+    def callback(self, *names: Any, **options: Any) -> Callable[..., Any]:
+        """Typer's decorator, with `--effect`."""
+        register = super().callback(*names, **options)
+        return lambda function: register(_with_effects(function))
+
+
+def _with_effects(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Add `--effect` to a function with the option `--model`."""
+    hint = get_type_hints(function, include_extras=True).get("model")
+    if not any(isinstance(each, _Option) for each in getattr(hint, "__metadata__", ())):
+        return function
+
+    @wraps(function)
+    def run(*given: Any, effect: list[Path] | None, **named: Any) -> Any:  # noqa: ANN401
+        for path in effect or ():
+            # Imported here: who completes a word or asks for help waits for no catalogue.
+            from pma_gym.effects.user_effects import load_effects
+
+            load_effects(path)
+        return function(*given, **named)
+
+    signature = inspect.signature(function)
+    added = inspect.Parameter(
+        "effect", inspect.Parameter.KEYWORD_ONLY, default=None, annotation=EffectOption
+    )
+    parameters = [*signature.parameters.values(), added]
+    run.__signature__ = signature.replace(parameters=parameters)  # type: ignore[attr-defined]
+    run.__annotations__ = {**function.__annotations__, "effect": EffectOption}
+    return run
 
 
 class _StrictCommand(TyperCommand):

@@ -14,14 +14,20 @@
 
     DRAG = Effect("drag", "slide_force", Drag, drag, signature="force as the square of speed")
 
-`load_effects` runs such a file as `python file.py` would, because the user named it; no other file
-is ever run. It checks the effects that the file defines and adds them to the catalogue of this
-process, for models, simulations and diagnoses.
+A file is run where its user names it and nowhere else: in the option `--effect` of a command, in a
+call of `load_effects`, or in the environment variable `PMA_GYM_EFFECTS`. A model file names the
+file of its user effects too, but only for people: no model, data set or pickle runs code.
+`load_effects` runs the file as `python file.py` would, checks the effects that it defines, and adds
+them to the catalogue of this process and the file to `PMA_GYM_EFFECTS`, which worker processes
+inherit.
 """
 
 import hashlib
 import importlib.util
+import os
+import shlex
 import sys
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from types import ModuleType
 from typing import NamedTuple
@@ -30,8 +36,17 @@ from pma_gym.effects import CATALOGUE, Effect
 from pma_gym.effects.user_effect_checks import broken_rule, numbers
 from pma_gym.paths import as_path
 
-_HEAD = ("schema", "name", "title", "plant")
-"""Keys of a model file that are not effects."""
+NAMED = "PMA_GYM_EFFECTS"
+"""Environment variable with files of effects, separated as in PATH; `load_effects` adds to it."""
+
+EFFECTS_FROM = "effects_from"
+"""Key of a model file with the names of the Python files that its user effects come from."""
+
+HEAD = ("schema", "name", "title", "plant", EFFECTS_FROM)
+"""Keys of a model file that are not effects; the last one only where it has user effects."""
+
+_named = ""
+"""Value of the environment variable whose files were loaded."""
 
 _sources: dict[str, "_Source"] = {}
 """Source file of every user effect, by the effect's name."""
@@ -60,12 +75,18 @@ def load_effects(path: str | Path) -> list[Effect]:
         OwnEffectError: the file cannot be run or defines no effect, or an effect breaks a rule.
     """
     path = as_path(path, OwnEffectError).resolve()
+    if os.pathsep in str(path):
+        raise OwnEffectError(
+            f"{path}: has {os.pathsep!r} in its path, which separates the files in {NAMED}; "
+            "rename it or its folder"
+        )
     try:
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         raise OwnEffectError(f"{path}: cannot be read ({error}); name a Python file") from error
     known = [name for name, source in _sources.items() if source.path == path]
     if known and all(_sources[name].text == text for name in known):
+        _add_to_environment(path)
         return [CATALOGUE[name] for name in known]
     module = _run(path, text)
     effects = _defined(module)
@@ -76,17 +97,77 @@ def load_effects(path: str | Path) -> list[Effect]:
         )
     for i, effect in enumerate(effects):
         _check(path, module, effect, [other.name for other in effects[:i]])
-    for name in known:
+    for name in {*known} - {effect.name for effect in effects}:
         del CATALOGUE[name], _sources[name]
     for effect in effects:
         CATALOGUE[effect.name] = effect
         _sources[effect.name] = _Source(path, text, _digest(effect, text))
+    _add_to_environment(path)
     return effects
+
+
+def load_named_effects() -> None:
+    """Load the files that the environment variable names, unless that is done.
+
+    Raises:
+        OwnEffectError: as `load_effects`.
+    """
+    global _named
+    named = os.environ.get(NAMED, "")
+    if named == _named:
+        return
+    paths = [str(Path(name).resolve()) for name in named.split(os.pathsep) if name]
+    # Before they run: a file may ask for a model. Whole paths: a worker may run in another folder.
+    _named = os.environ[NAMED] = os.pathsep.join(paths)
+    for path in paths:
+        try:
+            load_effects(path)
+        except OwnEffectError as error:
+            _named = ""
+            raise OwnEffectError(f"{NAMED} names {error}") from error
+
+
+def _add_to_environment(path: Path) -> None:
+    paths = [name for name in os.environ.get(NAMED, "").split(os.pathsep) if name]
+    if str(path) not in paths:
+        os.environ[NAMED] = os.pathsep.join([*paths, str(path)])
+
+
+def how_to_load(names: Sequence[str]) -> str:
+    """Say how to load the files that user effects come from.
+
+    >>> how_to_load(["mine.py"]).partition(",")[0]
+    'add --effect mine.py to the command'
+    """
+    options = " ".join(f"--effect {shlex.quote(name)}" for name in names)
+    calls = ", ".join(f'load_effects("{name}")' for name in names)
+    return (
+        f"add {options} to the command, call {calls} of pma_gym.effects.user_effects first, or set "
+        f"the environment variable {NAMED}={shlex.quote(os.pathsep.join(names))}"
+    )
 
 
 def source_of(name: str) -> str:
     """Hash of the source text of a user's effect, for keys of compiled code; empty for others."""
     return _sources[name].digest if name in _sources else ""
+
+
+def sources_of(names: Iterable[str]) -> dict[str, str]:
+    """Names of the files that user effects among these come from, with a hash of those effects."""
+    parts: dict[str, list[str]] = {}
+    for name in names:
+        if name in _sources:
+            parts.setdefault(_sources[name].path.name, []).append(_sources[name].digest)
+    return {
+        file: hashlib.sha256(" ".join(digests).encode()).hexdigest()[:16]
+        for file, digests in sorted(parts.items())
+    }
+
+
+def loaded_digest() -> str:
+    """Hash of all user effects of this process, which a diagnosis tries; empty without any."""
+    load_named_effects()
+    return " ".join(sources_of(_sources).values())
 
 
 def _digest(effect: Effect, text: str) -> str:
@@ -143,7 +224,7 @@ def _check(path: Path, module: ModuleType, effect: Effect, others: list[str]) ->
 
 
 def _name(name: str, path: Path, others: list[str]) -> str:
-    if not isinstance(name, str) or not name.isidentifier() or name in _HEAD:
+    if not isinstance(name, str) or not name.isidentifier() or name in HEAD:
         return "needs a name of letters, digits and _, for its table in a model file"
     if name in others:
         return "is there twice in this file; give each effect a name of its own"

@@ -4,9 +4,8 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from pma_gym.effects import CATALOGUE
 from pma_gym.engine.snapshot import StateError
-from pma_gym.plant.model import Model
+from pma_gym.plant.model import Model, known_effect
 from pma_gym.plant.parameter_rows import Note
 from pma_gym.units import Quantity
 
@@ -29,8 +28,8 @@ def parse_model_document(document: Mapping[str, Any]) -> Model:
     """Make a model from a document of `model_document`.
 
     Raises:
-        StateError: an unknown effect or parameter, or a value out of its bounds.
-        ModelError: effects that do not form a plant.
+        StateError: an unknown parameter, or a value out of its bounds.
+        ModelError: an unknown effect, or effects that do not form a plant.
     """
     parameters = {name: _parameters(name, p) for name, p in document["parameters"].items()}
     notes = {path: _note(path, note) for path, note in document["notes"].items()}
@@ -55,9 +54,7 @@ def _note(path: str, given: Any) -> Note:  # noqa: ANN401
 
 
 def _parameters(name: str, given: Mapping[str, Any]) -> Any:  # noqa: ANN401
-    if name not in CATALOGUE:
-        raise StateError(f"a drawn station has the effect {name}, which is not in the catalogue")
-    effect = CATALOGUE[name]
+    effect = known_effect(name)
     if set(given) != set(effect.quantities):
         raise StateError(
             f"[{name}] of a drawn station must have {', '.join(effect.quantities)}, got "

@@ -2,7 +2,7 @@
 
 import difflib
 import reprlib
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from importlib import resources
 from pathlib import Path
@@ -15,6 +15,13 @@ from pma_gym.documents import DocumentError, read_toml
 from pma_gym.effects import CATALOGUE, Effect
 from pma_gym.effects.effect import Parameters, Value
 from pma_gym.effects.ports import SENSOR_DELAY, Port, measured_output
+from pma_gym.effects.user_effects import (
+    EFFECTS_FROM,
+    HEAD,
+    how_to_load,
+    load_named_effects,
+    sources_of,
+)
 from pma_gym.limits import LimitError
 from pma_gym.paths import is_path, missing_file
 from pma_gym.plant.parameter_rows import Note, ParameterRow
@@ -23,7 +30,7 @@ from pma_gym.plant.toml import LINE_FORM, toml_text
 
 SCHEMA = 1
 _shown = reprlib.repr
-_HEAD = ("schema", "name", "title", "plant")
+_HEAD = HEAD[:-1]
 
 
 class ModelError(ValueError):
@@ -51,16 +58,17 @@ class Model:
     def __post_init__(self) -> None:
         """Freeze the parameters and check that the plant's ports are filled."""
         for name in self.parameters:
-            _known(name)
+            known_effect(name)
         ordered = {name: self.parameters[name] for name in CATALOGUE if name in self.parameters}
         object.__setattr__(self, "parameters", MappingProxyType(ordered))
         object.__setattr__(self, "notes", MappingProxyType(dict(self.notes)))
         _check_ports(self)
 
-    def __reduce__(self) -> tuple[type["Model"], tuple[object, ...]]:
-        """Copy and pickle by construction, because a read-only mapping cannot be pickled."""
-        groups = (dict(self.parameters), dict(self.notes))
-        return Model, (self.name, self.title, self.plant, *groups)
+    def __reduce__(self) -> tuple[Any, tuple[object, ...]]:
+        """Copy and pickle as numbers, because the class of a user effect is of one process."""
+        numbers = {name: values._asdict() for name, values in self.parameters.items()}
+        head = {key: getattr(self, key) for key in _HEAD[1:]}
+        return _unpickled, (head, numbers, dict(self.notes), list(sources_of(self.parameters)))
 
     @property
     def effects(self) -> dict[str, Effect]:
@@ -142,7 +150,7 @@ class Model:
 
     def _added(self, effect: str, values: Mapping[str, Value]) -> Parameters:
         """Parameters of an effect to be added, some of them given."""
-        known = _known(effect)
+        known = known_effect(effect)
         before = self.parameters.get(effect, known.neutral)
         missing = [
             file_key
@@ -154,7 +162,7 @@ class Model:
                 f"[{effect}] is never absent: it has no neutral values; give {', '.join(missing)}"
             )
         if before is None:
-            return _parse(effect, values)
+            return _parse(known, values)
         try:
             return known.changed(before, values)
         except KeyError as error:
@@ -239,17 +247,22 @@ def _existing(path: Path) -> Path:
 
 
 def _read(path: Path) -> Model:
+    # A fault of the user's files is none of this one.
+    load_named_effects()
     try:
-        return parse_model(read_toml(path, LINE_FORM, finite=False))
+        return parse_model(read_toml(path, LINE_FORM, finite=False), path.parent)
     except (DocumentError, LimitError) as error:
         raise ModelError(str(error)) from error
     except ValueError as error:
         raise ModelError(f"{path}: {error}") from error
 
 
-def parse_model(document: Mapping[str, Any]) -> Model:
+def parse_model(document: Mapping[str, Any], folder: Path | None = None) -> Model:
     """Make a model from a parsed TOML document.
 
+    Args:
+        document: the document.
+        folder: where its file lies, from which the files that it names count.
     Raises:
         ModelError: as `load_model`.
     """
@@ -259,20 +272,37 @@ def parse_model(document: Mapping[str, Any]) -> Model:
             f"schema must be {SCHEMA}, the only form of model files that this version reads, "
             f"{came}; write schema = {SCHEMA} as the first line"
         )
+    files = document.get(EFFECTS_FROM, [])
+    if not isinstance(files, list) or not all(isinstance(name, str) for name in files):
+        raise ModelError(
+            f"{EFFECTS_FROM} must be a list of the names of Python files, {EFFECTS_FROM} = "
+            f'["mine.py"]; got {_shown(files)}'
+        )
     missing = [key for key in _HEAD if key not in document]
     if missing:
         raise ModelError(f"a model needs {', '.join(_HEAD)}; missing: {', '.join(missing)}")
     for key in _HEAD[1:]:
         if not isinstance(document[key], str):
             raise ModelError(f'{key} must be a text, {key} = "...", got {_shown(document[key])}')
-    tables = {key: value for key, value in document.items() if key not in _HEAD}
+    files = _effect_files(document.get(EFFECTS_FROM, []), folder)
+    tables = {key: value for key, value in document.items() if key not in HEAD}
     parameters, notes = {}, {}
     for effect, table in tables.items():
         values, table_notes = _split(effect, table)
-        parameters[effect] = _parse(effect, values)
+        parameters[effect] = _parse(known_effect(effect, files), values)
         notes |= table_notes
     head = {key: document[key] for key in ("name", "title", "plant")}
     return Model(**head, parameters=parameters, notes=notes)
+
+
+def _effect_files(names: object, folder: Path | None) -> list[str]:
+    """The files that user effects come from, by the path from here where they lie in a folder."""
+    if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
+        raise ModelError(
+            f"{EFFECTS_FROM} must be a list of the names of Python files, {EFFECTS_FROM} = "
+            f'["mine.py"]; got {_shown(names)}'
+        )
+    return [str(folder / n) if folder and (folder / n).is_file() else n for n in names]
 
 
 def _split(effect: str, table: object) -> tuple[dict[str, Value], dict[str, Note]]:
@@ -302,19 +332,53 @@ def _is_finite(value: object) -> bool:
     return real and abs(value) < 1e308  # type: ignore[arg-type]
 
 
-def _parse(effect: str, values: Mapping[str, Value]) -> Parameters:
+def _parse(effect: Effect, values: Mapping[str, Value]) -> Parameters:
     try:
-        return _known(effect).parse(values)
+        return effect.parse(values)
     except ValueError as error:
         raise ModelError(str(error)) from error
 
 
-def _known(effect: str) -> Effect:
-    if effect not in CATALOGUE:
-        near = difflib.get_close_matches(effect, list(CATALOGUE), 1)
-        hint = f"did you mean [{near[0]}]?" if near else f"known: {', '.join(CATALOGUE)}"
-        raise ModelError(f"unknown effect [{effect}]; {hint}")
-    return CATALOGUE[effect]
+def known_effect(name: str, files: Sequence[str] = ()) -> Effect:
+    """The effect of a name, of the catalogue or of the user's files.
+
+    Args:
+        name: its name.
+        files: names of the Python files that a model says its user effects come from.
+    Raises:
+        ModelError: there is none; with what to do.
+        OwnEffectError: a file that the environment variable names cannot be used.
+    """
+    load_named_effects()
+    if name in CATALOGUE:
+        return CATALOGUE[name]
+    if files:
+        raise ModelError(
+            f"unknown effect [{name}]; the model says that its user effects come from "
+            f"{', '.join(files)}, which runs only if you say so: {how_to_load(files)}"
+        )
+    near = difflib.get_close_matches(name, list(CATALOGUE), 1)
+    hint = f"did you mean [{near[0]}]?" if near else f"known: {', '.join(CATALOGUE)}"
+    raise ModelError(
+        f"unknown effect [{name}]; {hint}; if a Python file of yours defines it, "
+        f"{how_to_load(['FILE.py'])}"
+    )
+
+
+def _unpickled(
+    head: Mapping[str, str],
+    numbers: Mapping[str, Mapping[str, Any]],
+    notes: Mapping[str, Note],
+    files: Sequence[str],
+) -> Model:
+    """Make the model of `Model.__reduce__`."""
+    try:
+        parameters = {
+            name: known_effect(name, files).parameters(**values) for name, values in numbers.items()
+        }
+    except (ModelError, TypeError) as error:
+        raise ModelError(f"pickled model {head['name']}: {error}") from error
+    return Model(**head, parameters=parameters, notes=notes)
 
 
 def _check_ports(model: Model) -> None:
@@ -364,9 +428,15 @@ def _check_port(model: Model, name: str, port: Port) -> None:
 
 
 def dump_model(model: Model) -> str:
-    """Return the model as TOML text; equal models give equal bytes."""
+    """Return the model as TOML text; equal models give equal bytes.
+
+    With user effects it names their files, with a hash of the laws in a comment.
+    """
     lines = [f"schema = {SCHEMA}"]
-    lines += [f"{key} = {toml_text(getattr(model, key))}" for key in ("name", "title", "plant")]
+    lines += [f"{key} = {toml_text(getattr(model, key))}" for key in _HEAD[1:]]
+    if sources := sources_of(model.parameters):
+        names, digests = ", ".join(map(toml_text, sources)), " ".join(sources.values())
+        lines.append(f"{EFFECTS_FROM} = [{names}]  # sha256 {digests}")
     for effect in model.parameters:
         lines += ["", f"[{effect}]"]
         for name, value in model.values_in_files(effect).items():

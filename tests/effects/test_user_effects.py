@@ -1,20 +1,31 @@
 """Effects of one's own: a file named by its user, checked, added, simulated."""
 
+import copy
 import inspect
+import json
+import os
+import pickle
 import re
+import subprocess
+import sys
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from benchmarks.executors.executor import run_or_raise
+from benchmarks.executors.local import LocalProcesses
 from pma_gym.codegen.trace import live_inputs
 from pma_gym.data.trial import Trial
+from pma_gym.discovery.fitting.journal import digest
 from pma_gym.effects import CATALOGUE, Effect, user_effects
 from pma_gym.effects.ports import EVERYTHING, OPEN_PORTS, SENSOR_PORTS, STATION_PORTS
 from pma_gym.effects.user_effects import OwnEffectError, load_effects, source_of
+from pma_gym.envs import PMAEnv
 from pma_gym.integrator.equations import COMMANDS, ZERO
 from pma_gym.plant.composition import PlantEquations
-from pma_gym.plant.model import load_model
+from pma_gym.plant.model import ModelError, dump_model, load_model
 from pma_gym.plant.plant import Plant
 from pma_gym.plant.program import structure
 from pma_gym.plant.rigs.station import write_equations
@@ -45,13 +56,7 @@ DRAG = Effect("drag", "slide_force", Drag, drag, signature="force as the square 
 )
 
 
-@pytest.fixture(autouse=True)
-def only_what_was_there():
-    catalogue, sources = dict(CATALOGUE), dict(user_effects._sources)
-    yield
-    for known, before in ((CATALOGUE, catalogue), (user_effects._sources, sources)):
-        known.clear()
-        known.update(before)
+pytestmark = pytest.mark.usefixtures("forget_user_effects")
 
 
 @pytest.fixture
@@ -270,10 +275,92 @@ def test_an_effect_with_a_memory_settles_and_runs(write, station):
     assert (way(station) - way(plant)).max() > 1e-4
 
 
-def test_a_model_file_may_name_it(write, tmp_path, station):
-    from pma_gym.plant.model import dump_model
-
+@pytest.fixture
+def dragged(write, tmp_path, station):
+    """A model with a user effect, saved beside its file, and pickled environments of it."""
     load_effects(write(DRAG))
-    model = station.model.with_effects({"drag": {"factor_n_s2_per_mm2": 0.02}})
+    model = station.model.with_effects({"drag": {"factor_n_s2_per_mm2": 0.02}}, name="dragged")
     (tmp_path / "model.toml").write_text(dump_model(model))
-    assert load_model(tmp_path / "model.toml").parameters["drag"] == model.parameters["drag"]
+    return model
+
+
+def test_a_saved_model_names_the_file_and_the_law_of_its_user_effects(dragged, write, tmp_path):
+    saved = (tmp_path / "model.toml").read_text()
+    assert load_model(tmp_path / "model.toml").parameters["drag"] == dragged.parameters["drag"]
+    assert '\neffects_from = ["mine.py"]  # sha256 ' in saved
+    load_effects(write(DRAG.replace("-p.factor *", "-3.0 * p.factor *")))
+    assert dump_model(dragged).partition("sha256")[0] == saved.partition("sha256")[0]
+    assert dump_model(dragged) != saved
+    assert "effects_from" not in dump_model(load_model("station"))
+
+
+def test_what_a_diagnosis_keeps_depends_on_the_law_of_every_user_effect(write, station):
+    load_effects(write(DRAG))
+    before = digest((), station.model, "")
+    load_effects(write(DRAG.replace("-p.factor *", "-3.0 * p.factor *")))
+    assert digest((), station.model, "") != before
+
+
+def test_a_model_runs_no_file_but_says_how_to(dragged, tmp_path, forget_user_effects):
+    forget_user_effects()
+    path, own = tmp_path / "model.toml", tmp_path / "mine.py"
+    with pytest.raises(ModelError) as raised:
+        load_model(path)
+    for part in (f"{path}: unknown effect [drag]", f"--effect {own}", f'load_effects("{own}")'):
+        assert part in str(raised.value)
+    assert f"PMA_GYM_EFFECTS={own}" in str(raised.value)
+
+
+@pytest.mark.parametrize("names", ["mine.py", [3]])
+def test_a_model_names_files_in_a_list(dragged, tmp_path, names):
+    text = (tmp_path / "model.toml").read_text()
+    start, _, rest = text.partition("effects_from = ")
+    rest = f"{json.dumps(names)}\n{rest.partition(chr(10))[2]}"
+    (tmp_path / "model.toml").write_text(f"{start}effects_from = {rest}")
+    with pytest.raises(ModelError, match=r"effects_from must be a list of .*got"):
+        load_model(tmp_path / "model.toml")
+
+
+def test_a_pickle_runs_no_file_but_takes_those_that_are_named(dragged, tmp_path):
+    """Environment, plant and model of a user effect, in processes that have loaded no file."""
+    kept = tmp_path / "kept.pickle"
+    env = PMAEnv("displacement", model=dragged, pressure_kpa=300.0)
+    env.reset(seed=1)
+    kept.write_bytes(pickle.dumps((env, Plant(dragged), dragged)))
+    after = env.step(np.zeros(env.action_space.shape, np.float32))[0]
+    program = (
+        "import pickle, sys, numpy as np; env, plant, model = pickle.load(open(sys.argv[1], 'rb'));"
+        "print(*map(float, env.step(np.zeros(env.action_space.shape, np.float32))[0]))"
+    )
+
+    def fresh():
+        return subprocess.run(
+            [sys.executable, "-c", program, kept], capture_output=True, text=True, cwd="/"
+        )
+
+    assert os.environ["PMA_GYM_EFFECTS"] == str(tmp_path / "mine.py")
+    done = fresh()
+    assert done.stdout.split() == [str(float(one)) for one in after], done.stderr
+    del os.environ["PMA_GYM_EFFECTS"]
+    said = fresh().stderr.splitlines()[-1]
+    assert "pickled model dragged: unknown effect [drag]; the model says" in said
+    assert "from mine.py" in said and "--effect mine.py" in said
+
+
+def test_workers_know_the_effects_of_their_parent(dragged):
+    models = {}
+    run_or_raise([partial(copy.copy, dragged)] * 2, LocalProcesses(2), models.__setitem__)
+    assert [dump_model(models[i]) for i in (0, 1)] == [dump_model(dragged)] * 2
+
+
+def test_the_variable_names_files_of_which_one_may_be_wrong(write, monkeypatch):
+    monkeypatch.setenv("PMA_GYM_EFFECTS", os.pathsep.join(["", str(write(DRAG)), "gone.py"]))
+    for _ in range(2):
+        with pytest.raises(OwnEffectError, match=r"^PMA_GYM_EFFECTS names .*gone.py: cannot be"):
+            load_model("station")
+    assert "drag" in CATALOGUE
+
+
+def test_a_file_whose_path_the_variable_cannot_have_is_refused(tmp_path):
+    with pytest.raises(OwnEffectError, match=r"in its path, which separates .*; rename it"):
+        load_effects(tmp_path / f"my{os.pathsep}effects.py")

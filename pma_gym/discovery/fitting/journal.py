@@ -12,6 +12,7 @@ import numpy as np
 from pma_gym.data.trial import Trial
 from pma_gym.document_shape import check_shape
 from pma_gym.documents import parse_json, read_content
+from pma_gym.effects.user_effects import loaded_digest
 from pma_gym.files import replace_file
 from pma_gym.plant.model import Model, dump_model
 
@@ -90,6 +91,7 @@ def digest(trials: Sequence[Trial], model: Model, question: str) -> str:
     """What trials, a model and a question are, in a few characters."""
     checksum = hashlib.sha256(question.encode())
     checksum.update(dump_model(model).encode())
+    checksum.update(loaded_digest().encode())
     for trial in trials:
         for name, values in (
             ("time", trial.time),

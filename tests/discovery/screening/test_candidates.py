@@ -6,7 +6,7 @@ import pytest
 from pma_gym.discovery.fitting.candidate_effect import bounds
 from pma_gym.discovery.screening.candidates import FAR, candidate_effects
 from pma_gym.discovery.workflow import diagnose
-from pma_gym.effects import CATALOGUE, user_effects
+from pma_gym.effects import CATALOGUE
 from pma_gym.effects.ports import measured_output
 from pma_gym.effects.user_effects import load_effects
 from tests.discovery.laboratory import LEVELS, OFF, STATION, fit_problem, laboratory, measured
@@ -37,15 +37,6 @@ SWIRL = Effect("swirl", "slide_force", Swirl, swirl, signature="force as the squ
 @pytest.fixture(scope="module")
 def trials():
     return measured(STATION, 2, rate=64.0, seconds=4.0)
-
-
-@pytest.fixture
-def catalogue():
-    kept, sources = dict(CATALOGUE), dict(user_effects._sources)
-    yield CATALOGUE
-    for known, before in ((CATALOGUE, kept), (user_effects._sources, sources)):
-        known.clear()
-        known.update(before)
 
 
 def test_every_effect_that_can_be_absent_is_a_candidate_or_replaces_another_law():
@@ -177,7 +168,7 @@ def test_beside_another_model_keeps_its_parameters():
         assert candidate.effect in beside.parameters
 
 
-def test_an_effect_of_ones_own_takes_part(catalogue, tmp_path):
+def test_an_effect_of_ones_own_takes_part(forget_user_effects, tmp_path):
     path = tmp_path / "mine.py"
     path.write_text(OWN, encoding="utf-8")
     load_effects(path)
