@@ -13,7 +13,6 @@ from pma_gym.cli.controller_source import controller_of
 from pma_gym.cli.film import FILMS, write_film
 from pma_gym.cli.terminal import read
 from pma_gym.data.trial import TrialError
-from pma_gym.engine.option_checks import parse_pressure
 from pma_gym.envs import PMAEnv
 from pma_gym.files import OutputError, check_output
 
@@ -54,7 +53,7 @@ def watch(
         "human" if video is None else "rgb_array",
         width,
         model=model,
-        pressure_kpa=parse_pressure(pressure),
+        pressure_kpa=pressure,
     )
     chosen = _voltages(controller, env)
     env.reset(seed=seed)

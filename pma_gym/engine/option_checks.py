@@ -6,11 +6,8 @@ from collections.abc import Iterable, Sequence
 from typing import TypeGuard
 
 from pma_gym.engine.plain_values import plain_sequence
+from pma_gym.plant.model import Model
 from pma_gym.tasks import OPERATOR_BOUNDS, Operator
-
-LOWEST_PRESSURE_KPA = 150.0
-HIGHEST_PRESSURE_KPA = 575.0
-"""Range of pressures (kPa) of the station's measurements: table I3."""
 
 Pressure = float | Sequence[float] | str
 """Gauge pressure of the episodes (kPa): one, several to draw from, or "random"."""
@@ -74,8 +71,8 @@ def check_operator(operator: Operator) -> None:
         check_number(f"operator.{name}", value, lower, upper, unit)
 
 
-def check_pressure(pressure: object) -> None:
-    """Reject a pressure outside the range of the station's measurements.
+def check_pressure(pressure: object, model: Model | None = None) -> None:
+    """Reject what is no pressure, and one outside the validity of a model.
 
     Raises:
         ValueError: with the range, the unit and the value.
@@ -87,22 +84,26 @@ def check_pressure(pressure: object) -> None:
         raise ValueError(
             f'pressure_kpa must be a number in kPa, a list of numbers or "random", got {pressure!r}'
         )
+    if model is None:
+        return
+    valid = model.parameters["validity"]
+    unit = f"kPa ([validity] of model {model.name})"
     for one in several:
-        check_number("pressure_kpa", one, LOWEST_PRESSURE_KPA, HIGHEST_PRESSURE_KPA, "kPa")
+        check_number("pressure_kpa", one, 1e-3 * valid.lowest, 1e-3 * valid.highest, unit)
 
 
-def parse_pressure(given: object) -> Pressure:
+def parse_pressure(given: object, model: Model) -> Pressure:
     """Check the pressure of episodes and return it as plain Python values.
 
     Raises:
         ValueError: with the range, the unit and the value.
     """
     pressure = plain_sequence(given)
-    check_pressure(pressure)
+    check_pressure(pressure, model)
     return pressure
 
 
-def parse_pressures(given: object, count: int) -> list[Pressure]:
+def parse_pressures(given: object, count: int, model: Model) -> list[Pressure]:
     """Check one pressure per environment and return them as plain Python values.
 
     Raises:
@@ -116,7 +117,7 @@ def parse_pressures(given: object, count: int) -> list[Pressure]:
             f"{length}: {given!r}; pressure_kpa is one for all"
         )
     for pressure in pressures:
-        check_pressure(pressure)
+        check_pressure(pressure, model)
     return pressures
 
 

@@ -60,7 +60,8 @@ class Options:
 
     Attributes:
         pressure_kpa: gauge pressure of the episodes (kPa): a number, several to draw from (a list,
-            a range, an array), or "random" for all initial pressures of the task's trials.
+            a range, an array) within the validity of the model, or "random" for all initial
+            pressures of the task's trials that lie there.
         model: name of a shipped model, path of a TOML file, or a Model.
         memory_at_start: initial hysteresis state of the muscle, -1 to 1 (1: filled and contracted);
             None: the value of the model or of the randomisation. It has no effect on a model
@@ -249,8 +250,9 @@ def parse_task(given: str | Task, options: Options) -> Task:
     """Return the task of a name, or a given Task, after a check of the options.
 
     Raises:
-        ValueError: an unknown name, with the nearest known one; or an option that does not apply
-            to the task.
+        ModelError: an unknown or invalid model.
+        ValueError: an unknown name, with the nearest known one; an option that does not apply to
+            the task; or a start pressure outside the model's validity.
     """
     task = named_task(given) if isinstance(given, str) else given
     if not isinstance(task, Task):
@@ -261,7 +263,23 @@ def parse_task(given: str | Task, options: Options) -> Task:
             f"{task.name} is the regulator's already: leave the option out"
         )
     _check_exercise(task, options)
-    return task
+    model = options.nominal
+    return _started_within(task, options.pressure_kpa, model) if model.rig.has_muscle else task
+
+
+def _started_within(task: Task, pressure: Pressure, model: Model) -> Task:
+    """Check the pressure of episodes, and limit the task's start pressures to the validity."""
+    check_pressure(pressure, model)
+    valid = model.parameters["validity"]
+    low, high = task.starts
+    if pressure == "random" and not (low <= valid.highest and high >= valid.lowest):
+        raise ValueError(
+            f"task {task.name} begins at {1e-3 * low:g}-{1e-3 * high:g} kPa, and model "
+            f"{model.name} is valid at {1e-3 * valid.lowest:g}-{1e-3 * valid.highest:g} kPa; give "
+            "pressure_kpa, or a task with other start_pressures (Pa)"
+        )
+    starts = tuple(min(max(each, valid.lowest), valid.highest) for each in task.starts)
+    return task if starts == task.starts else replace(task, start_pressures=starts)
 
 
 def _check_exercise(task: Task, options: Options) -> None:

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from pma_gym.engine.option_checks import Pressure, parse_pressure, parse_pressures
 from pma_gym.engine.plain_values import plain_scalar
+from pma_gym.plant.model import Model
 
 
 def all_seeds(seed: int | Sequence[int | None] | None, count: int) -> list[int | None]:
@@ -69,7 +70,7 @@ def masked(mask: object, count: int) -> NDArray[np.int64]:
 
 
 def wanted_pressures(
-    options: Mapping[str, Any], indices: NDArray[np.int64], count: int
+    options: Mapping[str, Any], indices: NDArray[np.int64], count: int, model: Model
 ) -> list[Pressure] | None:
     """Return the pressures that a reset's options set, or None.
 
@@ -77,16 +78,17 @@ def wanted_pressures(
         options: may contain `pressure_kpa` for all, or `pressures_kpa` for each environment.
         indices: the environments to reset.
         count: number of environments.
+        model: the nominal model.
     Raises:
         ValueError: with the rule and the invalid value.
     """
     if "pressures_kpa" in options:
         if "pressure_kpa" in options:
             raise ValueError("give either pressure_kpa for all or pressures_kpa for each")
-        pressures = parse_pressures(options["pressures_kpa"], count)
+        pressures = parse_pressures(options["pressures_kpa"], count, model)
         return [pressures[i] for i in indices.tolist()]
     if "pressure_kpa" in options:
-        return [parse_pressure(options["pressure_kpa"])] * len(indices)
+        return [parse_pressure(options["pressure_kpa"], model)] * len(indices)
     return None
 
 

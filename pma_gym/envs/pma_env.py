@@ -351,7 +351,7 @@ class PMAEnv(Copies, SeededByReset, Episode, gym.Env[NDArray[np.float32], NDArra
     def _wanted_pressure(self, options: Mapping[str, Any]) -> Pressure:
         check_known("reset option", options, RESET_OPTIONS)
         if "pressure_kpa" in options:
-            return parse_pressure(options["pressure_kpa"])
+            return parse_pressure(options["pressure_kpa"], self._engine.nominal_model)
         return self.options.pressure_kpa
 
     # -- states ------------------------------------------------------------------------------------

@@ -130,7 +130,7 @@ class PMAVectorEnv(
         if pressures_kpa is not None:
             if "pressure_kpa" in options:
                 raise ValueError("give either pressure_kpa for all or pressures_kpa for each")
-            pressures_kpa = parse_pressures(pressures_kpa, num_envs)
+            pressures_kpa = parse_pressures(pressures_kpa, num_envs, self.options.nominal)
         single = precision == "single"
         kind = Engine if render_mode is None else RecordingEngine
         self.engine = kind(self.task, self.options, num_envs, int(threads), single, pressures_kpa)
@@ -178,7 +178,7 @@ class PMAVectorEnv(
         given = dict(options or {})
         check_known("reset option", given, RESET_OPTIONS)
         indices = masked(given["reset_mask"], self.num_envs) if "reset_mask" in given else self._all
-        wanted = wanted_pressures(given, indices, self.num_envs)
+        wanted = wanted_pressures(given, indices, self.num_envs, self.engine.nominal_model)
         seeds = self._own_seeds(all_seeds(self._or_drawn(seed), self.num_envs), indices)
         # Should it fail on the way, these have no episode.
         self._begun[indices], self._idle = False, True

@@ -128,9 +128,15 @@ def regulator_voltage(model: Model, pressure: float) -> float:
     """Regulator voltage (V) of a model for a steady pressure (Pa).
 
     Raises:
-        ValueError: if the regulator would need less than 0 or more than 10 V.
+        ValueError: the rig has no regulator, or the regulator would need less than 0 or more than
+            10 V.
     """
-    line = model.parameters["regulator_line"]
+    line = model.parameters.get("regulator_line")
+    if line is None:
+        raise ValueError(
+            f"model {model.name} is of a {model.plant} without a regulator, so that no pressure "
+            f"can be set, got {pressure / 1e3:g} kPa; leave the pressure out"
+        )
     voltage = (pressure - line.offset) / line.gain
     if not 0.0 <= voltage <= 10.0:
         low, high = max(0.0, line.offset), 10.0 * line.gain + line.offset

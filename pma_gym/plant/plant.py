@@ -39,18 +39,25 @@ class Plant(CompiledModel):
     ) -> Condition:
         """Return the equilibrium at constant commands, with the model's initial hysteresis states.
 
+        A rig without an equilibrium, such as a joint, is at its model's initial position and speed.
+
         Args:
-            motor_voltage: motor command (V).
-            pressure: gauge pressure (Pa), as an alternative to the regulator's voltage.
+            motor_voltage: motor command (V, or the SI unit of the drive's command).
+            pressure: gauge pressure (Pa), as an alternative to the regulator's voltage; neither is
+                needed by a rig without a regulator.
             regulator_voltage: regulator command (V).
         Raises:
-            ValueError: neither pressure nor regulator voltage, a voltage out of 0-10 V, a pressure
-                that the regulator does not reach, or a load that the muscle cannot balance.
+            ValueError: neither pressure nor regulator voltage for a regulator, a voltage out of
+                0-10 V, a pressure that the regulator does not reach, or a load that the muscle
+                cannot balance.
         """
         if regulator_voltage is None:
-            if pressure is None:
-                raise ValueError("settle needs a pressure (Pa) or a regulator_voltage (V)")
-            regulator_voltage = self.regulator_voltage(pressure)
+            if pressure is None and "regulator_line" in self.parameters:
+                raise ValueError(
+                    f"settle() needs a pressure (Pa) or a regulator_voltage (V) for the regulator "
+                    f"of model {self.model.name}"
+                )
+            regulator_voltage = 0.0 if pressure is None else self.regulator_voltage(pressure)
         return equilibrium_at(self, motor_voltage, regulator_voltage)
 
     def step(

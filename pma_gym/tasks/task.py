@@ -32,7 +32,8 @@ class Task:
         actuator: whose voltage the action is. The regulator's contracts the muscle against `load`,
             and the quantity is `contraction`; the motor's pulls it at one pressure.
         load: load that the motor holds where the regulator moves (N); 0 where the motor moves.
-        start_pressures: range of the pressures that episodes begin at (Pa); the trials' if None.
+        start_pressures: range of the pressures that episodes begin at (Pa), as far as the model's
+            validity has it; the trials' if None.
         exercise: of an operator, played by the motor while the regulator resists; else None.
     """
 
@@ -47,6 +48,11 @@ class Task:
 
     def __post_init__(self) -> None:
         """Refuse what no environment can do."""
+        if len(self.starts) != 2 or not 0.0 <= self.starts[0] <= self.starts[1] < float("inf"):
+            raise ValueError(
+                f"task {self.name}: start pressures must be two gauge pressures in Pa (kPa times "
+                f"1000) from 0 on, the lower first, got {self.starts}"
+            )
         if self.exercise is None:
             self._check_mover()
         elif self.actuator != "regulator" or self.load:

@@ -6,7 +6,9 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-from pma_gym.envs import PMAEnv
+from pma_gym.envs import PMAEnv, PMAVectorEnv
+from pma_gym.plant.model import load_model
+from pma_gym.tasks import EVERY_TASK, TASKS, isotonic
 
 
 def refused(error: type[Exception], *words: str, **options) -> None:
@@ -68,6 +70,37 @@ def test_unknown_options_are_refused_in_pythons_words_with_the_nearest():
 def test_pressures_out_of_range_are_refused(pressure):
     bad = pressure[1] if isinstance(pressure, list) else pressure
     refused(ValueError, "pressure_kpa", "150-575 kPa", f"got {bad!r}", pressure_kpa=pressure)
+
+
+@pytest.mark.parametrize(
+    ("valid", "task", "drawn"),
+    [
+        ((0, 800), isotonic(50.0, start_pressures=(50e3, 60e3)), (50.0, 60.0)),
+        ((0, 800), TASKS["displacement"], (150.0, 575.0)),
+        ((200, 210), TASKS["displacement"], (200.0, 210.0)),
+        ((0, 210), EVERY_TASK["isotonic"], (150.0, 210.0)),
+    ],
+)
+def test_start_pressures_are_those_of_the_task_within_the_models_validity(valid, task, drawn):
+    ends = {"validity.lowest_kpa": valid[0], "validity.highest_kpa": valid[1]}
+    model = load_model("station").replace(ends)
+    batch = PMAVectorEnv(32, task, model=model)
+    batch.reset(seed=0)
+    low, high = drawn
+    assert np.all((1e3 * low <= batch.pressures) & (batch.pressures <= 1e3 * high))
+    assert np.ptp(batch.pressures) > 500.0 * (high - low)
+    chosen = 1e3 * min(valid[1], 500.0)
+    env = PMAEnv("displacement", model=model, pressure_kpa=1e-3 * chosen)
+    env.reset(seed=0)
+    assert env.pressure == chosen
+    with pytest.raises(ValueError, match=rf"in {valid[0]}-{valid[1]} kPa .*station.*got 900"):
+        env.reset(options={"pressure_kpa": 900})
+
+
+def test_a_task_whose_pressures_no_model_has_is_refused():
+    refused(ValueError, "task low begins at 0.05-0.06 kPa", "valid at 150-575 kPa", "(Pa)",
+            task=isotonic(start_pressures=(50, 60), name="low"))  # fmt: skip
+    PMAEnv(isotonic(start_pressures=(50, 60)), pressure_kpa=300).reset(seed=0)
 
 
 @pytest.mark.parametrize("pressure", ["high", [], None, [300, "random"], True, {"kpa": 3}])
@@ -141,7 +174,7 @@ def test_bad_reset_options_are_refused_and_the_episode_goes_on(make):
     words = "unknown reset option 'presure' (did you mean 'pressure_kpa'?)"
     with pytest.raises(TypeError, match=re.escape(words)):
         env.reset(options={"presure": 3})
-    with pytest.raises(ValueError, match=r"150-575 kPa, got 900"):
+    with pytest.raises(ValueError, match=r"150-575 kPa .*, got 900"):
         env.reset(options={"pressure_kpa": 900})
     env.step(env.action(0.0))
 

@@ -68,7 +68,7 @@ def test_what_no_muscle_balances_is_refused():
         Plant("schulte").settle(3.0, 0.0)
     with pytest.raises(ValueError, match="what the regulator reaches with 0-10 V; got 900 kPa"):
         plant.settle(0.0, 900e3)
-    with pytest.raises(ValueError, match="settle needs a pressure"):
+    with pytest.raises(ValueError, match=r"settle\(\) needs a pressure"):
         plant.settle(1.0)
 
 

@@ -8,6 +8,7 @@ from pma_gym import Plant
 from pma_gym.data.files.trial_files import read_trial
 from pma_gym.data.trial import Trial, TrialError
 from pma_gym.effects import CATALOGUE
+from pma_gym.envs import PMAEnv
 from pma_gym.estimation.fitting import fit
 from pma_gym.estimation.residuals import Residuals
 from pma_gym.plant.model import Model
@@ -40,6 +41,16 @@ def swung(model, duration, command=0.0, name="torque_command"):
     trial = Trial(time, {name: np.full(time.size, command)})
     measured = Plant(model).simulate(trial, noise=False).measurements
     return time, measured["angle"], measured["speed"]
+
+
+def test_a_joint_settles_at_its_start_without_a_pressure_and_is_called_a_joint():
+    model = joint(True, 20.0, joint_weight={"moment_n_m": 0.48, "offset_deg": 0.0})
+    rest = Plant(model).settle()
+    assert dict(zip(Plant(model).states, rest.state, strict=True))["angle"] == np.radians(20.0)
+    with pytest.raises(ValueError, match="model joint is of a joint without a regulator.*300 kPa"):
+        Plant(model).settle(pressure=300e3)
+    with pytest.raises(ValueError, match='plant = "joint", which has no muscle'):
+        PMAEnv("rotation", model=model)
 
 
 @pytest.mark.parametrize(("start", "turns"), [(1.0, 0), (60.0, 0), (60.0, 1000), (150.0, 0)])
