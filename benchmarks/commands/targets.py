@@ -23,7 +23,7 @@ def targets(
     as_json: JsonOption = False,
 ) -> None:
     """Check a run against what its suite asks for; exit code 1 if a target is missed."""
-    from benchmarks.bounds.cache import Bounds
+    from benchmarks.bounds import Bounds
     from benchmarks.report.leaderboard import read_leaderboard
     from benchmarks.report.tables import verdict_table
     from benchmarks.reproduction.job import targets_again

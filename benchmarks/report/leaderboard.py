@@ -6,7 +6,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from benchmarks.bounds.cache import Bounds
+from benchmarks.bounds import Bounds
 from benchmarks.comparison.command_lines import run_command
 from benchmarks.report.errors import Errors, Measure, SuiteRecord, measures, pooled_measure, task_of
 from benchmarks.report.margins import Condition, conditions, is_linear

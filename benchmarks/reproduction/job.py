@@ -7,7 +7,7 @@ from typing import Any
 
 from rich.console import Console
 
-from benchmarks.bounds.cache import Bounds
+from benchmarks.bounds import Bounds
 from benchmarks.executors.executor import Executor
 from benchmarks.reproduction.pictured import pictured_trials
 from benchmarks.reproduction.report import write_report

@@ -9,7 +9,7 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
-from benchmarks.bounds.achievable import achievable_bound
+from benchmarks.bounds import achievable_bound
 from controllers import CONTROLLERS
 from pma_gym.plant.model import load_model
 

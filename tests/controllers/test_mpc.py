@@ -104,7 +104,7 @@ def test_it_tracks_rotation_within_the_target(drive):
 
 
 def test_it_lets_the_cable_go_loose_without_throwing_the_rotor(drive):
-    # The achievable bound of phase III is under 0.01 deg here (`benchmarks.bounds.achievable`).
+    # The achievable bound of phase III is under 0.01 deg here (`benchmarks.bounds`).
     by_phase, _ = drive(PreviewMPC(), "rotation", 575)
     assert by_phase["III"] < 0.2
 

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+import benchmarks.bounds as module
 from benchmarks.__main__ import app
-from benchmarks.bounds import cache as module
 from benchmarks.report.errors import Measure, SuiteRecord, is_bound, measures, pooled_measure
 from benchmarks.report.leaderboard import Leaderboard, read_leaderboard
 from benchmarks.report.page import page_blocks

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from benchmarks.bounds.cache import BOUNDS, Bounds
+from benchmarks.bounds import BOUNDS, Bounds
 from benchmarks.executors.local import Background
 from benchmarks.report.verdicts import largest_excess
 

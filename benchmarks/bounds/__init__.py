@@ -1,1 +1,0 @@
-"""Achievable bounds: how closely a trial can be followed by whoever knows everything."""
