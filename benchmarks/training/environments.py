@@ -7,7 +7,6 @@ from stable_baselines3.common.vec_env import VecEnv
 from benchmarks.training.configuration.preset import Preset
 from benchmarks.training.policy_batch import PilotedVecEnv
 from benchmarks.training.stations import VALIDATION, VALIDATION_FIRST, Stations
-from pma_gym.sb3 import SB3VecEnv
 from pma_gym.tasks import named_task
 
 PRESSURE_STEP_KPA = 25
@@ -56,10 +55,6 @@ def _made(
     options.setdefault("pressure_kpa", pressures_kpa(preset))
     if drawn is not None:
         options |= {"randomisation": drawn, "model": drawn.structure}
-    if preset.view.kind == "environment":
-        view = preset.view
-        options |= {"preview": view.preview, "history": view.history}
-        return SB3VecEnv(count, preset.task, threads=threads, **options)
     nominal = str(preset.options.get("model", "station"))
     return PilotedVecEnv(
         count,

@@ -218,15 +218,10 @@ def _check_environment(preset: Preset) -> None:
     parse_task(preset.task, parse_options(options))
     if preset.stations:
         training_recipe(preset.stations)
-    if preset.view.kind == "environment" and preset.form.kind != "direct":
+    if preset.view.kind != "tracking":
         raise ValueError(
-            f"the environment's own view goes with a direct form, got {preset.form.kind}; take a "
-            "tracking view or a direct form"
-        )
-    if preset.view.kind == "environment" and preset.reward_scale != 1.0:
-        raise ValueError(
-            "the environment's own view goes with its own rewards, got reward_scale "
-            f"{preset.reward_scale:g}; leave it out or take a tracking view"
+            f"view must be of kind tracking, got {preset.view.kind}; on the environment's own view "
+            "train with a script of your own, see docs/train-a-policy.md"
         )
     if preset.form.base:
         base_of(preset.form)
