@@ -5,9 +5,11 @@ import tomllib
 
 import numpy as np
 import pytest
+from scipy.io import savemat
 
 from pma_gym.cli import main
 from pma_gym.data.datasets.dataset import read_dataset
+from pma_gym.plant.model import load_model
 from tests.discovery.preparation.data_checks.logs import logs, write
 
 NAMES = {
@@ -94,3 +96,57 @@ def test_json_has_what_every_column_is_taken_for(tmp_path, capsys):
     misfit = json.loads(out)["misfit_rms"]
     assert code == 0 and set(misfit) >= {"contraction_mm", "load_n"}
     assert all(size > 0.0 for size in misfit.values())
+
+
+JOINT = """schema = 1
+name = "pendulum"
+title = "A pendulum"
+plant = "joint"
+[torque_drive]
+gain = 1.0
+[joint_weight]
+moment_n_m = 0.2
+offset_deg = 0.0
+[joint_damping]
+coefficient_n_m_s = 0.02
+[inertia]
+inertia_kg_m2 = 0.0049
+[joint_start]
+angle_deg = 0.0
+spin_deg_per_s = 0.0
+[encoder]
+bandwidth_hz = 2000
+noise_deg = 0.02
+"""
+TIME = np.arange(0.0, 4.0, 0.01)
+SWING = np.stack([TIME, 20.0 * np.sin(TIME), 0.2 * np.cos(TIME), 0.35 * np.cos(TIME)], axis=1)
+
+
+def test_a_draft_is_of_the_models_rig_and_reads_from_any_directory(tmp_path, capsys, monkeypatch):
+    (tmp_path / "lab").mkdir()
+    (tmp_path / "joint.toml").write_text(JOINT)
+    header = "time,position,torque [mNm],velocity"
+    np.savetxt(tmp_path / "lab" / "a.csv", SWING, delimiter=",", header=header, comments="")
+    monkeypatch.chdir(tmp_path)
+    code, _, err = run(capsys, "convert", "lab", "--model", "joint.toml")
+    assert (code, err) == (0, "")
+    assert tomllib.loads((tmp_path / "lab/dataset.toml").read_text())["model"] == "../joint.toml"
+    moved = tmp_path.rename(tmp_path.with_name("moved"))
+    monkeypatch.chdir(moved.parent)
+    dataset = read_dataset(moved / "lab")
+    assert load_model(dataset.model).name == "pendulum"
+    trial = dataset.trials[0].trial
+    assert trial.measurements["angle"] == pytest.approx(np.radians(SWING[:, 1]))
+    assert trial.commands["torque_command"] == pytest.approx(1e-3 * SWING[:, 2])
+    assert trial.measurements["speed"] == pytest.approx(SWING[:, 3])
+
+
+@pytest.mark.parametrize("name", ["a.csv", "a.mat"])
+def test_a_matrix_without_names_is_shown_by_what_its_columns_hold(tmp_path, capsys, name):
+    if name == "a.csv":
+        np.savetxt(tmp_path / name, SWING, delimiter=",")
+    else:
+        savemat(tmp_path / name, {"data": SWING})
+    code, _, err = run(capsys, "convert", tmp_path)
+    assert code == 2
+    assert "column 1 holds 0 to 3.99, column 2 holds -15 to 20, column 3 holds" in err

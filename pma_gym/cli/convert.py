@@ -1,5 +1,6 @@
 """`pma-gym convert`: show the columns of a lab's files and draft a `dataset.toml` for them."""
 
+import os
 import warnings
 from pathlib import Path
 from typing import Annotated
@@ -17,6 +18,7 @@ from pma_gym.data.datasets.drafting import SeenColumn, draft, one_line, seen_col
 from pma_gym.data.trial_columns import TrialError
 from pma_gym.files import OutputError, replace_file
 from pma_gym.plant.model import Model, load_model
+from pma_gym.plant.sensors import quantities
 
 
 def convert(
@@ -38,7 +40,7 @@ def convert(
     given = load_model(model)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        columns, count = seen_columns(folder, Description())
+        columns, count = seen_columns(folder, Description(), quantities(given))
     if not as_json:
         console().print(_table(columns, count))
     title = folder.resolve().name
@@ -66,7 +68,7 @@ def convert(
 def _named(model: str, folder: Path) -> str:
     """A model as dataset.toml names it: a path counts from the data set's folder."""
     is_path = model.endswith(".toml") or "/" in model or "\\" in model
-    return str(Path(model).resolve()) if is_path else model
+    return Path(os.path.relpath(model, folder)).as_posix() if is_path else model
 
 
 def _checked(folder: Path, model: Model) -> list[str]:

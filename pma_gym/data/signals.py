@@ -176,6 +176,7 @@ _ALL: tuple[Signal, ...] = (
         "command",
         "torque",
         "torque asked of a joint's drive",
+        words=("torque", "moment", "drehmoment", "tau"),
     ),
     Signal(
         "winding_voltage",
@@ -183,6 +184,7 @@ _ALL: tuple[Signal, ...] = (
         "command",
         "voltage",
         "voltage at the winding of a joint's motor, of either sign",
+        words=("voltage", "spannung", "volt", "motor", "umotor", "u"),
     ),
     Signal(
         "contraction_command",
@@ -267,6 +269,17 @@ _ALL: tuple[Signal, ...] = (
         "angle of a joint, encoder or potentiometer",
         sensor="encoder",
         other_units=("rad",),
+        words=(
+            "angle",
+            "winkel",
+            "position",
+            "pos",
+            "rotation",
+            "drehung",
+            "encoder",
+            "theta",
+            "phi",
+        ),
         forwards="turning forwards",
         backwards="turning back",
     ),
@@ -278,6 +291,7 @@ _ALL: tuple[Signal, ...] = (
         "speed of a joint, gyroscope or tachometer",
         sensor="gyroscope",
         other_units=("deg/s",),
+        words=("speed", "velocity", "drehzahl", "geschwindigkeit", "omega", "gyro", "tacho"),
     ),
     Signal(
         "velocity",
@@ -300,6 +314,7 @@ _ALL: tuple[Signal, ...] = (
         "force on a drive that imposes a motion; positive pulls in the direction of contraction",
         sensor="force_sensor",
         other_units=("kN", "lbf", "kip"),
+        words=("force", "kraft", "load", "last", "f"),
     ),
     Signal(
         "extension",

@@ -143,6 +143,15 @@ def direct_command(model: Model) -> str:
     return next((command for drive, command in commands if drive in model.parameters), "")
 
 
+def quantities(model: Model) -> frozenset[str]:
+    """What trials of a model's rig hold: its signals, and commands of its drive and regulator."""
+    direct = direct_command(model)
+    commands = {direct} if direct else {"motor_voltage", "load_command"}
+    if model.rig.has_muscle:
+        commands |= {"regulator_voltage", "pressure_command"}
+    return frozenset(commands.union(model.rig.outputs))
+
+
 def imposed_record(model: Model, trial: Trial) -> np.ndarray:
     """Positions that an imposed motion is asked for (m), or that were measured of it.
 

@@ -1,7 +1,7 @@
 """A first `dataset.toml` for a lab's files, to be read and corrected."""
 
 import re
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -38,12 +38,15 @@ class SeenColumn:
     chosen: bool
 
 
-def seen_columns(folder: Path, description: Description) -> tuple[list[SeenColumn], int]:
+def seen_columns(
+    folder: Path, description: Description, quantities: Collection[str]
+) -> tuple[list[SeenColumn], int]:
     """The columns of a folder's files, in the order of the first file that has them.
 
     Args:
         folder: the data set.
         description: what an older `dataset.toml` says; only its form counts.
+        quantities: what the rig commands and measures.
     Returns:
         The columns, and how many tables were read.
     Raises:
@@ -62,7 +65,7 @@ def seen_columns(folder: Path, description: Description) -> tuple[list[SeenColum
     for name, parts in numbers.items():
         values = np.concatenate(parts)
         there = values[np.isfinite(values)]
-        guess = guess_column(name, units[name], there)
+        guess = guess_column(name, units[name], there, quantities)
         chosen = guess is not None and guess.column.quantity not in taken
         if guess is not None:
             taken.add(guess.column.quantity)

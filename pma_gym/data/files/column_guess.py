@@ -1,6 +1,7 @@
 """Guesses of a lab's columns from their names, units and values."""
 
 import re
+from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
@@ -46,13 +47,14 @@ class Guess:
     why: str
 
 
-def guess_column(name: str, unit: str, values: Array) -> Guess | None:
+def guess_column(name: str, unit: str, values: Array, quantities: Collection[str]) -> Guess | None:
     """Guess what a column holds; None without evidence.
 
     Args:
         name: its name in the file.
         unit: its unit, where the file tells it beside the name; else empty.
         values: its numbers, NaN where a cell holds none.
+        quantities: what the rig commands and measures.
     """
     if name in BY_NAME:
         return Guess(BY_NAME[name], 1.0, "its name")
@@ -60,20 +62,22 @@ def guess_column(name: str, unit: str, values: Array) -> Guess | None:
     unit = unit_of(unit) or suffix_unit
     words = re.findall(r"[^\W\d_]+", re.sub(r"(?<=[a-z])(?=[A-Z])", " ", stem).lower())
     for quantity, known in _WORDS.items():
-        if not any(word in known for word in words):
+        if not any(word in known for word in words) or quantity not in {"time", *quantities}:
             continue
         if unit == "v" and quantity in _RAW and not set(words) & set(_ASKED):
             return Guess(BY_NAME[_RAW[quantity]], 1.0, "its name, in volts")
         asked = quantity in _COMMANDED and bool(set(words) & set(_ASKED))
         column = BY_NAME[(_COMMANDED if asked else _MEASURED)[quantity]]
-        factor = FACTORS[column.unit].get(unit) if unit else None
+        factor = FACTORS.get(column.unit, {}).get(unit) if unit else None
         if unit and factor is None:
             continue
         if factor is not None:
             return Guess(column, factor, f"its name and unit, {unit}")
         return Guess(column, *_by_range(column, values))
     close = looks_like(name)
-    return None if close is None else Guess(*close, "a name like it")
+    if close is None or close[0].quantity not in {"time", *quantities}:
+        return None
+    return Guess(*close, "a name like it")
 
 
 def _split(name: str) -> tuple[str, str]:

@@ -4,9 +4,9 @@ import datetime
 import re
 from collections.abc import Mapping, Sequence
 
-from pma_gym.data.readers.cells import bare_text
+from pma_gym.data.readers.cells import bare_text, cell_number, decimal_mark
 from pma_gym.data.readers.clock import looks_like_clock
-from pma_gym.data.readers.table import NoHeaderError, Request, Table, shown
+from pma_gym.data.readers.table import NoHeaderError, Request, Table, ranges, shown
 from pma_gym.data.readers.units import unit_of
 from pma_gym.data.trial_columns import TrialError
 from pma_gym.limits import check_limit
@@ -162,7 +162,7 @@ def _header(file: str, rows: Sequence[Row], request: Request) -> tuple[int, list
         # The topmost of the fullest: a title is shorter, a row of units comes below.
         at = max(above, key=lambda i: (_count(rows[i][1]), -i))
         return at, _names(file, rows[at])
-    raise _no_header(file, rows[first] if first < len(rows) else rows[0])
+    raise _no_header(file, rows[first:] if first < len(rows) else rows)
 
 
 def _begins_samples(row: Sequence[object]) -> bool:
@@ -189,16 +189,18 @@ def _names(file: str, row: Row) -> list[str]:
     return names
 
 
-def _no_header(file: str, row: Row) -> TrialError:
+def _no_header(file: str, rows: Sequence[Row]) -> TrialError:
     """What to say of a file that begins with its samples."""
-    width = _count(row[1])
+    row, width = rows[0], _count(rows[0][1])
+    mark = decimal_mark([[_at(cells, i) for _, cells in rows] for i in range(width)])
+    columns = [[cell_number(_at(cells, i), mark) for _, cells in rows] for i in range(width)]
     example = ["time_s", "motor_voltage_v", "contraction_mm", "load_n"]
     return NoHeaderError(
         f"{file} has no header: row {row[0]}, its first, holds numbers; insert a row above it with "
         f"the names of its {width} column{'s' * (width > 1)} ({', '.join(example[:width])}...), or "
         f"name them for all files at once in dataset.toml: under [format], names = "
         f"[{', '.join(repr(name) for name in example[:width])}, ...] with {width} "
-        f"name{'s' * (width > 1)}"
+        f"name{'s' * (width > 1)}; {ranges(columns)}"
     )
 
 

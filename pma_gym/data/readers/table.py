@@ -1,7 +1,8 @@
 """A table as it stands in a file, and the lab's description of the form of its files."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import islice
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,24 @@ PROVENANCE = "provenance"
 
 PART = "#"
 """Between a file's name and the part of it that is meant: `march.xlsx#run2`."""
+
+
+_MOST_RANGES = 12
+
+
+def ranges(columns: Iterable[Iterable[float | None]]) -> str:
+    """What columns without names hold.
+
+    >>> ranges([[0.0, 0.5], [None, -1.0]])
+    'column 1 holds 0 to 0.5, column 2 holds -1 to -1'
+    """
+    said = []
+    for number, column in enumerate(islice(columns, _MOST_RANGES), start=1):
+        values = np.array([np.nan if value is None else value for value in column], float)
+        there = values[np.isfinite(values)]
+        held = f"{there.min():.4g} to {there.max():.4g}" if there.size else "no number"
+        said.append(f"column {number} holds {held}")
+    return ", ".join(said)
 
 
 class UnreadableError(TrialError):

@@ -6,7 +6,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from pma_gym.data.readers.table import PART, Request, Table, UnreadableError
+from pma_gym.data.readers.table import PART, Request, Table, UnreadableError, ranges
 from pma_gym.limits import check_limit
 
 Variable: TypeAlias = "np.ndarray | Sequence[Mapping[str, Variable]] | str | None"
@@ -47,11 +47,21 @@ def tables_of(variables: Mapping[str, Variable], file: str, request: Request) ->
         raise UnreadableError(
             f"{file} holds {names}, but no vectors of one length with a name each; save time_s and "
             "each signal as a vector, or give a matrix's columns names in dataset.toml: "
-            "[format] names = ['time_s', ...]"
+            f"[format] names = ['time_s', ...]{_matrices(variables)}"
         )
     if len(tables) == 1:
         return [replace(tables[0], file=file)]
     return tables
+
+
+def _matrices(variables: Mapping[str, Variable]) -> str:
+    """What the columns of matrices hold."""
+    shown = [
+        f"; in {name!r} {ranges(value.T)}"
+        for name, value in variables.items()
+        if isinstance(value, np.ndarray) and value.ndim == 2 and value.dtype.kind in "fiu"
+    ]
+    return "".join(shown[:5])
 
 
 def _groups(
