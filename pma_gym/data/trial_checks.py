@@ -1,14 +1,12 @@
 """What every trial must obey, said in words that tell where it does not and what to do."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pma_gym.data.time_order import Place, time_disorder
 from pma_gym.data.trial_columns import BY_QUANTITY, COLUMNS, Column, TrialError
-
-Place = Callable[[int], str]
-"""Says where the sample of an index stands: `row 381 of ramp.csv`."""
 
 COMMANDS = tuple(column.quantity for column in COLUMNS if column.kind == "command")
 """motor_voltage, regulator_voltage (V); instead of them load_command (N), pressure_command (Pa)."""
@@ -70,13 +68,9 @@ def check_time(time: NDArray[np.float64], place: Place) -> None:
             f"time_s must be a finite number of seconds, {place(int(bad[0]))} has {came}; "
             "fill it in or remove the row"
         )
-    later = 1 + np.flatnonzero(np.diff(time) <= 0)
-    if later.size:
-        before, after = (float(time[later[0] - 1]), float(time[later[0]]))
-        raise TrialError(
-            f"time_s must increase strictly, {place(int(later[0]))} has {after!r} s after "
-            f"{before!r} s; sort the rows, or split the file where a new trial begins"
-        )
+    disorder = time_disorder(time, place)
+    if disorder:
+        raise TrialError(f"time_s must increase strictly, {disorder}")
     steps, span = time.size - 1, float(time[-1] - time[0])
     ends = f"from {place(0)} to {place(steps)} it is"
     if span > LONGEST_S:

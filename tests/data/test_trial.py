@@ -70,7 +70,7 @@ def test_replacing_a_part_keeps_the_rest():
         ({"time": ["a", "b", "c"]}, "time must be an array of numbers"),
         (
             {"time": [0.0, 1.0, 1.0]},
-            "time_s must increase strictly, sample 2 has 1.0 s after 1.0 s; sort the rows",
+            "time_s must increase strictly, sample 2 has 1.0 s after 1.0 s; two rows have one",
         ),
         ({"time": [0.0, np.nan, 1.0]}, "time_s must be a finite number .*, sample 1 has none"),
         ({"time": [0.0, 1.0, np.inf]}, "time_s must be a finite number .*, sample 2 has inf"),
