@@ -156,10 +156,8 @@ class RepeatedExercise:
     def _scores(
         self, info: Mapping[str, Any], alive: NDArray[np.bool_]
     ) -> dict[str, NDArray[np.float64]]:
-        phases = info.get(f"rmse_by_phase_{self._suffix}")
-        if phases is None:
-            return {name: np.full(self.count, np.nan) for name in self._phases}
-        return {name: np.where(alive, phases.get(name, np.nan), np.nan) for name in self._phases}
+        keys = {name: f"rmse_{name}_{self._suffix}" for name in self._phases}
+        return {name: np.where(alive, info.get(key, np.nan), np.nan) for name, key in keys.items()}
 
     def course(self, voltages: NDArray[np.float64], iterations: int = 0) -> Course:
         """The exercise by one row of voltages (V), shape (steps,)."""

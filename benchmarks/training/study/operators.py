@@ -61,7 +61,7 @@ def judged(
     for seed in range(SEED, SEED + count):
         info = _driven(env, controller, seed)
         if info is not None:
-            errors.append(list(info[key].values()))
+            errors.append(list(env.episode_summary()[key].values()))
     phases = len(env.task.schedule.phases)
     return Judged(np.array(errors).reshape(-1, phases), count - len(errors))
 

@@ -171,8 +171,8 @@ def driven(env, controller, seed):
     controller.reset(env.reference, env.station)
     ended = False
     while not ended:
-        *_, ended, info = env.step(env.action(controller.act(env.measurement, env.time)))
-    return list(info["rmse_by_phase_deg"].values())
+        *_, ended, _ = env.step(env.action(controller.act(env.measurement, env.time)))
+    return list(env.episode_summary()["rmse_by_phase_deg"].values())
 
 
 def test_the_card_of_an_exercise_says_what_moves_and_how_it_is_made_again():
