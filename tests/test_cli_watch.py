@@ -111,7 +111,10 @@ def test_without_a_controller_every_kind_of_task_moves(run, task, monkeypatch):
         (["--controller", "air.csv"], "give a column motor_voltage_v, or another --task"),
         (["--video", "film.avi"], "a film ends in .mp4 or .gif; name it film.gif"),
         (["--video", "nowhere/film.gif"], "there is no folder nowhere"),
-        (["--pressure", "20"], "pressure_kpa must be a number in 150-575 kPa ([validity] of model station), got 20.0"),
+        (
+            ["--pressure", "20"],
+            "pressure_kpa must be a number in 150-575 kPa ([validity] of model station), got 20.0",
+        ),
         (["--task", "rotations", "--video", "a.gif"], "did you mean 'rotation'?"),
         (["--width", "401", "--video", "a.gif"], "render_width must be a multiple of 4"),
     ],

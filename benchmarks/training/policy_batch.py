@@ -109,16 +109,13 @@ class PilotedVecEnv(EngineVecEnv):
         self, i: int, entries: NDArray[np.float32], info: Mapping[str, Any], broken: bool
     ) -> dict[str, Any]:
         """Info of an environment whose episode ends; errors unless it was cut."""
-        name = f"rmse_by_phase_{self.envs.task.schedule.suffix}"
         last: dict[str, Any] = {
             "terminal_observation": entries,
             "TimeLimit.truncated": not broken,
             "episode": {"r": float(self._returns[i]), "l": int(self.pilots.steps[i]), "t": 0.0},
         }
-        if name in info and info[f"_{name}"][i]:
-            phases = info[name]
-            last[name] = {k: float(v[i]) for k, v in phases.items() if not k.startswith("_")}
-        return last
+        scored = [key for key in info if key.startswith("rmse_") and info[f"_{key}"][i]]
+        return last | {key: float(info[key][i]) for key in scored}
 
     def _begin_again(self, which: NDArray[np.int64], over: NDArray[np.bool_]) -> None:
         self.envs.reset(options={"reset_mask": over})

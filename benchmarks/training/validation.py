@@ -67,12 +67,12 @@ def validate(model: Any, envs: VecEnv, task: str) -> Validation:  # noqa: ANN401
 
 def _row(task: str, info: dict[str, Any], failed: bool) -> dict[str, Any]:
     """An episode's end as a row of a suite's journal."""
-    suffix = task_of(task).schedule.suffix
-    phases = {} if failed else info[f"rmse_by_phase_{suffix}"]
+    schedule = task_of(task).schedule
+    phases = () if failed else (phase.name for phase in schedule.phases)
     return {
         "task": task,
         "failure": "a limit" if failed else "",
-        "phases": {name: {"rmse": value} for name, value in phases.items()},
+        "phases": {name: {"rmse": info[f"rmse_{name}_{schedule.suffix}"]} for name in phases},
     }
 
 

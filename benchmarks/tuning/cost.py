@@ -2,7 +2,6 @@
 
 import math
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -73,14 +72,12 @@ class _Trial:
         env, controller = self.env, self._controller(gains)
         env.reset(seed=self.seed)
         controller.reset(env.reference, self.station)
-        ended, info = False, dict[str, Any]()
+        ended = False
         while not ended:
-            _, _, broken, ended, info = env.step(
-                env.action(controller.act(env.measurement, env.time))
-            )
+            _, _, broken, ended, _ = env.step(env.action(controller.act(env.measurement, env.time)))
             if broken:
                 return UNSTABLE_COST
-        by_phase = info.get("rmse_by_phase_mm") or info["rmse_by_phase_deg"]
+        by_phase = env.episode_summary()[f"rmse_by_phase_{self.job.schedule.suffix}"]
         target = TARGETS[self.job.schedule.quantity] / SI_FACTORS[self.job.schedule.unit]
         variation = float(np.abs(np.diff(env.voltages)).sum()) / env.time
         return float(np.mean(list(by_phase.values()))) / target + (

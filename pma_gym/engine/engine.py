@@ -1,6 +1,6 @@
 """The class `Engine`: one or many environments as arrays, stepped together."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from typing import Any
@@ -150,12 +150,15 @@ class Engine(Episodes):
         """Stop the threads."""
         self._threads.close()
 
-    def advance(self, copy: Callable[[], Any], given: NDArray[np.float64]) -> Callable[[Any], Any]:
+    def advance(
+        self, copy: Callable[[], Any], given: NDArray[np.float64], constants: Mapping[str, Any]
+    ) -> Callable[[Any], Any]:
         """Return the step of a single environment as a fast Python callable.
 
         Args:
             copy: makes the observation that is handed out.
             given: the row of `actions`.
+            constants: values of further keys of the info.
         Returns:
             What takes an action, or `given` with the action in it, and gives observation, reward,
             False, False and info, or 1 where the episode was terminated and 2 where it was
@@ -165,11 +168,11 @@ class Engine(Episodes):
         keys, known = self.state_layout.info, arrays.are_known()
         bound = {
             "arguments": self._address,
-            "infos": dict.fromkeys(keys),
+            "infos": dict.fromkeys(keys) | dict(constants),
             "keys": tuple(keys),
             "copy": copy,
             "no": False,
-            "yes": True,
+            "number": np.float64,
             "given": given,
             "array": np.ndarray if known else None,
             "single": np.dtype(np.float32),

@@ -93,30 +93,19 @@ def wanted_pressures(
 
 
 def spread(
-    columns: Mapping[str, Any], mask: NDArray[np.bool_], indices: NDArray[np.int64]
+    columns: Mapping[str, NDArray[Any]], mask: NDArray[np.bool_], indices: NDArray[np.int64]
 ) -> dict[str, Any]:
     """Expand values of some environments to arrays over all, each with its mask.
 
     Args:
-        columns: arrays by name, one value per environment in the mask, or dictionaries of such
-            arrays; NaN for a missing value.
+        columns: arrays by name, one value per environment in the mask.
         mask: bool, shape (num_envs,).
         indices: indices where the mask is true.
     """
     info: dict[str, Any] = {}
     for name, values in columns.items():
-        own, places = mask.copy(), indices
-        if isinstance(values, Mapping):
-            info[name], info[f"_{name}"] = spread(values, mask, indices), own
-            continue
-        if values.dtype.kind == "f" and (unknown := np.isnan(values)).any():
-            own[indices[unknown]] = False
-            places, values = indices[~unknown], values[~unknown]
-        if len(values):
-            # Texts: no reader has to skip what is None.
-            array = np.full(len(mask), "" if values.dtype.kind == "O" else 0, values.dtype)
-            array[places] = values
-            info[name], info[f"_{name}"] = array, own
+        info[name], info[f"_{name}"] = np.zeros(len(mask), values.dtype), mask.copy()
+        info[name][indices] = values
     return info
 
 

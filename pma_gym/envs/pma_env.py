@@ -26,9 +26,9 @@ from pma_gym.envs.seeding import SeededByReset
 from pma_gym.envs.setup import SINGLE, Setup, setup
 from pma_gym.envs.specs import completed_spec
 from pma_gym.envs.state import EnvState, check_state, generator_at, generator_state
-from pma_gym.envs.summary import last_info, step_info
+from pma_gym.envs.summary import last_info, no_scores, step_info
 from pma_gym.metrics import SAMPLE_RATE_HZ
-from pma_gym.tasks import Task
+from pma_gym.tasks import Task, limit_in_words
 
 OWN = ("task", "render_mode", "render_width")
 """Keyword arguments of an environment in addition to the options."""
@@ -150,6 +150,9 @@ class PMAEnv(Copies, SeededByReset, Episode, gym.Env[NDArray[np.float32], NDArra
     `env.disturbance` and `env.events` return them for analysis; controllers do not receive them.
 
     ## Info
+    Every info has the same keys, with numbers of NumPy: float64, and int64 for
+    `limit_code`.
+
     | key | value | unit |
     |---|---|---|
     | `time_s` | since the trial began | s |
@@ -159,13 +162,16 @@ class PMAEnv(Copies, SeededByReset, Episode, gym.Env[NDArray[np.float32], NDArra
     | `error_mm` or `error_deg` | true position minus reference | mm, deg |
     | `motor_voltage_v`, `regulator_voltage_v` | commands at the station in this step | V |
     | `pressure_kpa`, `load_n` | true gauge pressure and cable tension | kPa, N |
-    | `extrapolated` | pressure outside the dissertation's trials or the model's validity | |
+    | `extrapolated` | 1 if the pressure is outside the trials or the model's validity, else 0 | |
     | exercise: `moment_nm`, `operator_nm` | moment at the joint; intended by the operator | N m |
     | `speed_deg_s`, `power_w` | speed of the joint; its power into the device | deg/s, W |
     | if it prescribes a moment: `rotation_deg`, `prescribed_nm` | angle, moment | deg, N m |
     | and `excess_nm` for the position, `_nm` for `_mm` | moment minus prescribed moment | N m |
-    | at the end: `rmse_mm`, `rmse_deg` or `rmse_nm`, ... | see `episode_summary` | |
-    | at the end: `ended_by` | name of the limit that terminated the episode, else "" | |
+    | `rmse_mm`, `_deg` or `_nm` | in the last info, else 0: RMSE over all phases | mm, deg, N m |
+    | `rmse_I_mm` and so on | the same, of each phase; NaN if it has not begun | mm, deg, N m |
+    | `percent_of_range` | the same over all phases, in percent of the range | % |
+    | exercise: `pace_rmse_deg`, `work_j`, ... | in the last info, else 0: see `episode_summary` | |
+    | `limit_code` | number of the limit that terminated the episode (`ended_by`), else 0 | |
 
     ## Reset options
     `reset(options={"pressure_kpa": 300})` sets the pressure of one episode, as the keyword does.
@@ -240,7 +246,7 @@ class PMAEnv(Copies, SeededByReset, Episode, gym.Env[NDArray[np.float32], NDArra
         self._find_offsets()
         self._observed = self._engine.observations[0]
         self._given = self._engine.actions[0]
-        self._made = self._engine.advance(self._observed.copy, self._given)
+        self._made = self._engine.advance(self._observed.copy, self._given, no_scores(self.task))
         if callable(self.options.reward):
             self._made = self._rewarded(self._made)
         windowed = self.render_mode == "human"
@@ -332,7 +338,8 @@ class PMAEnv(Copies, SeededByReset, Episode, gym.Env[NDArray[np.float32], NDArra
         """What the step that ends an episode returns."""
         self._wait(f"the episode ended at {self.time:g} s")
         info = last_info(self._engine, 0)
-        self.ended_by = info["ended_by"]
+        model = self._engine.models[0]
+        self.ended_by = limit_in_words(model, info["limit_code"], self.task.exercise)
         self._display.show(self)
         return self._observed.copy(), self._number("reward"), terminated, not terminated, info
 

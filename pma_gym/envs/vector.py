@@ -13,7 +13,6 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from pma_gym.engine.actions import CommandLine
-from pma_gym.engine.cpu.python_step import TRUTHS
 from pma_gym.engine.engine import ActionError, Engine
 from pma_gym.engine.observation import ObservationTable
 from pma_gym.engine.option_checks import (
@@ -382,10 +381,7 @@ class PMAVectorEnv(
 
     def station_info(self) -> dict[str, NDArray[Any]]:
         """Return the values of `PMAEnv`'s info in the last step, shape (num_envs,) each."""
-        info: dict[str, NDArray[Any]] = {
-            name: self.engine.numbers(name) for name in self.engine.state_layout.info
-        }
-        return info | {name: info[name] != 0.0 for name in TRUTHS}
+        return {name: self.engine.numbers(name) for name in self.engine.state_layout.info}
 
     def measurements(self) -> NDArray[np.float64]:
         """Measurements that agents receive, `observation_delay_s` old (SI), shape (4, num_envs).

@@ -45,8 +45,8 @@ def drive() -> Callable[..., tuple[dict[str, float], np.ndarray]]:
             assert 0.0 <= voltage <= 10.0
             *_, terminated, truncated, info = env.step(env.action(voltage))
             ended = terminated or truncated
-        assert info["ended_by"] == ""
-        by_phase = info.get("rmse_by_phase_mm") or info["rmse_by_phase_deg"]
+        assert info["limit_code"] == 0
+        by_phase = env.episode_summary()[f"rmse_by_phase_{env.task.schedule.suffix}"]
         return by_phase, env.voltages
 
     return run

@@ -202,13 +202,13 @@ def test_stations_that_differ_from_their_model(task, late, most):
 def run(env, controller, nominal):
     env.reset(seed=1)
     controller.reset(env.reference, replace(env.station, model=nominal))
-    ended, info = False, {}
+    ended = False
     while not ended:
         voltage = controller.act(env.measurement, env.time)
         assert 0.0 <= voltage <= 10.0
-        *_, broken, ended, info = env.step(env.action(voltage))
+        *_, broken, ended, _ = env.step(env.action(voltage))
         assert not broken
-    return info.get("rmse_by_phase_mm") or info["rmse_by_phase_deg"]
+    return env.episode_summary()[f"rmse_by_phase_{env.task.schedule.suffix}"]
 
 
 @pytest.mark.parametrize("task", ["isotonic", "triangle_low"])

@@ -12,7 +12,32 @@ from pma_gym.engine.cpu.python_step import NOT_READ
 from pma_gym.engine.engine import Engine
 from pma_gym.engine.options import parse_options
 from pma_gym.envs import PMAEnv
+from pma_gym.plant.model import load_model
 from pma_gym.tasks import EVERY_TASK, TASKS
+
+
+@pytest.mark.parametrize(
+    ("name", "ends"),
+    [
+        *((name, "truncated") for name in EVERY_TASK),
+        *((name, "terminated") for name in ("rotation", "isotonic", "isokinetic_exercise")),
+    ],
+)
+def test_every_info_has_the_same_keys_types_and_no_score_before_the_last(name, ends):
+    limits = load_model("station").replace({"limits.pressure_kpa": 1.0})
+    env = PMAEnv(name, max_episode_steps=4, **({"model": limits} if ends == "terminated" else {}))
+    infos, over = [env.reset(seed=1)[1]], False
+    while not over:
+        *_, terminated, truncated, info = env.step(np.full(1, -0.5))
+        over = terminated or truncated
+        infos.append(info)
+    assert {"truncated": truncated, "terminated": terminated}[ends]
+    kinds = {key: np.int64 if key == "limit_code" else np.float64 for key in infos[0]}
+    for info in infos:
+        assert {key: type(value) for key, value in info.items()} == kinds
+    score = f"rmse_{env.task.schedule.suffix}"
+    assert [info[score] > 0.0 for info in infos] == [False] * (len(infos) - 1) + [True]
+    assert infos[-1]["limit_code"] == (4 if ends == "terminated" else 0)
 
 
 @pytest.mark.parametrize("task", EVERY_TASK)
@@ -26,10 +51,8 @@ def test_a_step_returns_what_the_record_holds(task):
         observation, reward, terminated, truncated, info = made
         assert type(made) is tuple and type(info) is dict
         assert terminated is False and truncated is False
-        assert list(info) == list(begun) == env._engine.state_layout.info
-        assert info == env._info()
-        assert {type(value) for name, value in info.items() if name != "extrapolated"} == {float}
-        assert type(info["extrapolated"]) is bool
+        assert list(info) == list(begun)
+        np.testing.assert_equal(info, env._info())
         assert type(reward) is float and reward == env._engine.rewards[0]
         np.testing.assert_array_equal(observation, env._observed)
         assert observation.base is None
@@ -42,7 +65,7 @@ def test_a_step_returns_what_the_record_holds(task):
 def test_a_pressure_that_the_trials_did_not_have_is_told():
     env = PMAEnv("rotation", pressure_kpa=150)
     env.reset(seed=0)
-    assert env.step(np.zeros(1, np.float32))[4]["extrapolated"] is True
+    assert env.step(np.zeros(1, np.float32))[4]["extrapolated"] == 1.0
 
 
 def test_steps_keep_nothing_and_take_no_reference_that_is_not_theirs():
@@ -50,13 +73,13 @@ def test_steps_keep_nothing_and_take_no_reference_that_is_not_theirs():
     env.reset(seed=0)
     action = np.zeros(1, np.float32)
     keys = env._engine.state_layout.info
-    held = [False, True, *keys, env._observed]
+    held = [False, *keys, env._observed]
     env.step(action)
     gc.collect()
     before, objects = [sys.getrefcount(one) for one in held], len(gc.get_objects())
     for _ in range(100):
         _, _, _, _, info = env.step(action)
-        assert all(sys.getrefcount(value) <= 4 for value in info.values() if type(value) is float)
+        assert all(sys.getrefcount(info[key]) <= 4 for key in keys)
         del info
     after = [sys.getrefcount(one) for one in held]
     assert np.abs(np.subtract(after, before)).max() <= 5
@@ -73,10 +96,10 @@ def test_what_goes_wrong_while_it_is_made_is_raised():
         raise MemoryError("no room for an observation")
 
     with pytest.raises(MemoryError, match="no room"):
-        engine.advance(fail, engine.actions[0])(np.zeros(1))
+        engine.advance(fail, engine.actions[0], {})(np.zeros(1))
     # The step itself was made.
     assert engine.counts().tolist() == [1]
-    assert engine.advance(lambda: "seen", engine.actions[0])(np.zeros(1))[0] == "seen"
+    assert engine.advance(lambda: "seen", engine.actions[0], {})(np.zeros(1))[0] == "seen"
 
 
 def _behind_a_byte(values):

@@ -131,9 +131,6 @@ def same_info(ours, theirs, over, masks=True) -> None:
         assert set(names) == {name for name in theirs if not name.startswith("_")}
     for name in names:
         mine, its = ours[name], theirs[name]
-        if isinstance(mine, dict):
-            same_info(mine, its, over, masks)
-            continue
         known = over
         if masks:
             # What every step has, the loop tells of all environments.

@@ -212,7 +212,7 @@ def test_scores_are_those_of_the_course(name):
     course = phase_rmse(env.task.schedule, env.trajectory())
     factor = math.pi / 180.0 if unit == "deg" else 1.0
     by_phase = {name: course[name] / factor for name in ("I", "II", "III")}
-    assert last[f"rmse_by_phase_{unit}"] == pytest.approx(by_phase, rel=1e-9)
+    assert {n: last[f"rmse_{n}_{unit}"] for n in by_phase} == pytest.approx(by_phase, rel=1e-9)
     assert last["peak_moment_nm"] == max(info["moment_nm"] for info in infos)
     assert last["peak_speed_deg_s"] == pytest.approx(max(abs(i["speed_deg_s"]) for i in infos))
     assert last["peak_power_w"] == max(abs(info["power_w"]) for info in infos)
@@ -279,7 +279,10 @@ def test_the_safety_layer_keeps_wild_commands_from_harm(name):
     ends = {}
     for safety in (True, False):
         env = PMAEnv(name, safety=safety)
-        ends[safety] = [adversarial(env, seed)["ended_by"] for seed in range(6)]
+        ends[safety] = []
+        for seed in range(6):
+            adversarial(env, seed)
+            ends[safety].append(env.ended_by)
     assert ends[True] == [""] * 6
     assert all("joint" in end for end in ends[False])
 
@@ -293,12 +296,13 @@ def test_what_is_not_safe_ends_an_episode():
         _, reward, terminated, _, info = env.step(env.action(env.regulator_voltage))
         if terminated:
             break
-    assert info["ended_by"] == "moment at the joint above the safe 24 N m"
+    assert env.ended_by == "moment at the joint above the safe 24 N m"
     assert info["moment_nm"] > 24.0 and reward < -1e4
     fast = replace(env.task, exercise=replace(env.task.exercise, safe_speed=math.radians(10.0)))
     env = PMAEnv(fast, safety=False)
     env.reset(seed=0)
-    assert held(env)[-1]["ended_by"] == "joint faster than the safe 10 deg/s"
+    assert held(env)[-1]["limit_code"] == 6
+    assert env.ended_by == "joint faster than the safe 10 deg/s"
 
 
 def test_the_observation_of_a_prescription_is_of_the_moment():

@@ -6,6 +6,7 @@ import pytest
 from gymnasium.vector import SyncVectorEnv
 
 from pma_gym.envs import ENVIRONMENTS, PMAEnv, PMAVectorEnv
+from pma_gym.tasks import limit_in_words
 
 DISPLACEMENT = "pma_gym/IsokineticDisplacement-v0"
 MADE = {"model": "serres2008", "pressure_kpa": 300.0, "control_rate_hz": 10.0}
@@ -22,7 +23,7 @@ def test_an_unknown_option_has_the_words_that_torchrl_looks_for():
 
 @pytest.mark.parametrize("mode", ["NextStep", "SameStep", "Disabled"])
 @pytest.mark.parametrize("kind", ["own", "sync"])
-def test_ended_by_is_a_text_wherever_an_episode_ends(mode, kind, fragile):
+def test_the_limit_has_its_number_wherever_an_episode_ends(mode, kind, fragile):
     made = {**MADE, "model": fragile}
     if kind == "own":
         envs = PMAVectorEnv(3, autoreset_mode=mode, **made)
@@ -37,13 +38,10 @@ def test_ended_by_is_a_text_wherever_an_episode_ends(mode, kind, fragile):
         over = terminated | truncated
         if over.any():
             final = info["final_info"] if mode == "SameStep" else info
-            words = final["ended_by"]
-            assert all(type(words[i]) is str for i in np.flatnonzero(over))
-            if kind == "own":
-                assert all(type(one) is str for one in words)
-            for i in np.flatnonzero(over):
-                assert bool(words[i]) == terminated[i]
-            seen |= {words[i] for i in np.flatnonzero(over)}
+            codes = final["limit_code"]
+            assert codes.dtype == np.int64
+            np.testing.assert_array_equal(codes[over] > 0, terminated[over])
+            seen |= {limit_in_words(made["model"], code) for code in codes[over].tolist()}
         if over.any() and mode == "Disabled":
             envs.reset(options={"reset_mask": over})
     assert {"", "cable tension above 450 N"} <= seen

@@ -113,12 +113,12 @@ def test_rmse_is_that_of_the_trajectory(make, follow, ramp, task):
         path[1920 * i : 1920 * i + 1923] - ideal(phase_times())
         for i, ideal in enumerate(ideals[unit])
     ]
-    by_phase = list(info[f"rmse_by_phase_{unit}"].values())
+    by_phase = list(env.episode_summary()[f"rmse_by_phase_{unit}"].values())
     assert by_phase == pytest.approx([rmse(error) for error in errors])
     assert info[f"rmse_{unit}"] == pytest.approx(rmse(np.concatenate(errors)))
     span = {"mm": 25, "deg": 90}[unit]
     assert info["percent_of_range"] == pytest.approx(100 * info[f"rmse_{unit}"] / span)
-    assert info["ended_by"] == ""
+    assert env.ended_by == ""
 
 
 @pytest.mark.parametrize("steps", [1, 10])

@@ -1,10 +1,5 @@
-"""Tianshou: PPO by a registered id, through its high-level interface.
+"""Tianshou: PPO by a registered id, through its high-level interface."""
 
-Its buffer takes a text that only an episode's last info has, such as `ended_by`, for a missing
-value, and refuses the episode. A wrapper leaves the numbers.
-"""
-
-import gymnasium as gym
 from tianshou.highlevel.config import OnPolicyTrainingConfig
 from tianshou.highlevel.env import EnvFactoryRegistered, VectorEnvType
 from tianshou.highlevel.experiment import ExperimentConfig, PPOExperimentBuilder
@@ -13,18 +8,10 @@ ID = "pma_gym:pma_gym/IsokineticDisplacement-v0"
 STEPS = 1024
 
 
-class NumbersOnly(gym.Wrapper):
-    """Infos without what is no number."""
-
-    def step(self, action):
-        *made, info = self.env.step(action)
-        return *made, {k: v for k, v in info.items() if isinstance(v, int | float)}
-
-
 def train(kind: VectorEnvType) -> None:
     """Train for an epoch with one kind of Tianshou's vectors of environments."""
     options = {"pressure_kpa": 300.0, "control_rate_hz": 20.0}
-    envs = EnvFactoryRegistered(task="Numbers-v0", venv_type=kind, **options)
+    envs = EnvFactoryRegistered(task=ID, venv_type=kind, **options)
     training = OnPolicyTrainingConfig(
         max_epochs=1,
         epoch_num_steps=STEPS,
@@ -40,7 +27,6 @@ def train(kind: VectorEnvType) -> None:
 
 
 if __name__ == "__main__":
-    gym.register("Numbers-v0", lambda **options: NumbersOnly(gym.make(ID, **options)))
     for kind in (VectorEnvType.DUMMY, VectorEnvType.SUBPROC):
         train(kind)
-    print(f"PPO {STEPS} steps with DummyVectorEnv and SubprocVectorEnv, infos cut to numbers")
+    print(f"PPO {STEPS} steps with DummyVectorEnv and SubprocVectorEnv")

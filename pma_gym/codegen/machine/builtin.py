@@ -22,6 +22,7 @@ INTERFACE = {
     "PyTuple_GetItem": "ppi",
     "PyTuple_New": "pi",
     "PyTuple_SetItem": "npip",
+    "PyType_GenericAlloc": "ppi",
     "Py_DecRef": "vp",
     "Py_IncRef": "vp",
 }

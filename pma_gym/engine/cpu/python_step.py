@@ -21,18 +21,19 @@ from pma_gym.engine.cpu.block_memory import ARGUMENTS
 from pma_gym.engine.state_layout import StateLayout
 
 BOUND = (
-    *("arguments", "infos", "keys", "copy", "no", "yes"),
+    *("arguments", "infos", "keys", "copy", "no", "number"),
     *("given", "array", "single", "double"),
 )
 """What `advance` is bound to: address of the step's arguments, a dictionary of the info's keys, the
-keys in order, what copies the observation, False and True; the array of actions, the type of
-arrays (None where no action is to be read here), and the dtypes of single and double precision."""
+keys of its numbers in order, what copies the observation, False and NumPy's type of numbers; the
+array of actions, the type of arrays (None where no action is to be read here), and the dtypes of
+single and double precision."""
+
+VALUE = float.__basicsize__ - 8
+"""Byte offset of the value in a float object, and in NumPy's float64, which inherits from it."""
 
 NOT_READ = 8
 """What `advance` returns for an action that is to be read in Python; nothing has happened then."""
-
-TRUTHS = ("extrapolated",)
-"""Keys of an info that are true or false."""
 
 _TYPES = {"p": POINTER, "i": INTEGER, "n": INDEX, "d": DOUBLE, "v": ir.VoidType()}
 
@@ -76,13 +77,9 @@ def write_python_step(module: ir.Module, state_layout: StateLayout) -> None:
     records = b.inttoptr(b.load(at, typ=INTEGER), POINTER)
     for i, key in enumerate(state_layout.info):
         number = b.load(offset(b, records, state_layout.offsets[key]), typ=DOUBLE)
-        if key in TRUTHS:
-            truth = b.fcmp_unordered("!=", number, ir.Constant(DOUBLE, 0.0))
-            value = b.select(truth, parts["yes"], parts["no"])
-            _call(b, "Py_IncRef", value)
-        else:
-            value = _call(b, "PyFloat_FromDouble", number)
-            _unless(b, _is_null(b, value), lost)
+        value = _call(b, "PyType_GenericAlloc", parts["number"], integer(0))
+        _unless(b, _is_null(b, value), lost)
+        b.store(number, offset(b, value, VALUE, ir.IntType(8)))
         name = _call(b, "PyTuple_GetItem", parts["keys"], integer(i))
         failed = _call(b, "PyDict_SetItem", info, name, value)
         _call(b, "Py_DecRef", value)

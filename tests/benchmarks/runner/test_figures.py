@@ -71,7 +71,7 @@ def test_phases_are_those_of_the_environment():
             truth[name].append(env.truth[name])
     scores = figures(env.task, Episode(env.trajectory(), volts, truth, [1e-5]), 0.01, LIMITS)
     assert {n: p.rmse for n, p in scores.phases.items()} == pytest.approx(
-        info["rmse_by_phase_deg"], rel=1e-9
+        env.episode_summary()["rmse_by_phase_deg"], rel=1e-9
     )
     assert scores.rmse == pytest.approx(info["rmse_deg"], rel=1e-9)
 

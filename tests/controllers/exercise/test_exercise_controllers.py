@@ -17,7 +17,7 @@ def rmse(name, task, seed, **options):
     while not ended:
         *_, over, done, info = env.step(env.action(controller.act(env.measurement, env.time)))
         ended = over or done
-    assert info["ended_by"] == ""
+    assert info["limit_code"] == 0
     return np.sqrt([env._engine.numbers(f"sum_{p.name}")[0] for p in env.task.schedule.phases])
 
 

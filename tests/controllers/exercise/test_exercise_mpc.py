@@ -21,8 +21,9 @@ def rmse(name, task, seed, **options):
         assert 0.0 <= voltage <= 10.0
         *_, terminated, truncated, info = env.step(env.action(voltage))
         ended = terminated or truncated
-    assert info["ended_by"] == ""
-    return np.array(list(info[f"rmse_by_phase_{env.task.schedule.suffix}"].values()))
+    assert info["limit_code"] == 0
+    key = f"rmse_by_phase_{env.task.schedule.suffix}"
+    return np.array(list(env.episode_summary()[key].values()))
 
 
 @pytest.fixture(scope="module")
