@@ -31,6 +31,7 @@ class Channel:
 
 def reference_times(channels: Sequence[Channel], request: Request) -> NDArray[np.float64] | None:
     """The times that rows take: the first command's, else those that most channels have."""
+    channels = [channel for channel in channels if len(channel.cells)]
     for channel in channels:
         if request.kind(channel.name) == "command":
             return channel.times
@@ -60,15 +61,15 @@ def on_rows(
     near = _TOLERANCE * step
     if times is not None and times.size == rows.size and np.abs(times - rows).max() <= near:
         return cells, ""
-    said = f"{channel.name!r} is read {_words(times)}, the rows {_words(rows)}"
+    said = f"{channel.name!r} has readings {_words(times)}, the rows are {_words(rows)}"
     placed = _placed(cells, times, rows, near) if times is not None else None
     kind = request.kind(channel.name)
     if not isinstance(placed, list) or (kind == "command" and None in placed):
         if not kind:
             return None, f"{said}: it is passed over"
-        one = f"the reading at {placed:.6g} s has" if isinstance(placed, float) else "readings have"
+        one = f"the reading at {placed:.6g} s has" if isinstance(placed, float) else "they have"
         raise TrialError(
-            f"{said}: {one} no row of {file} at that time; resample all channels to one clock in "
+            f"{said}: {one} no row of {file} to stand in; resample all channels to one clock in "
             "the program that wrote the file, and save it again"
         )
     filled = sum(cell is not None for cell in placed)
@@ -83,8 +84,7 @@ def _placed(
 ) -> list[object] | float:
     """Readings in the rows of their times; else the time of the first that has no row."""
     inside = np.flatnonzero((times >= rows[0] - near) & (times <= rows[-1] + near))
-    after = np.clip(np.searchsorted(rows, times[inside]), 1, max(rows.size - 1, 1))
-    nearest = after - (times[inside] - rows[after - 1] < rows[after] - times[inside])
+    nearest = np.searchsorted((rows[1:] + rows[:-1]) / 2, times[inside])
     missed = np.abs(times[inside] - rows[nearest]) > near
     missed[1:] |= nearest[1:] == nearest[:-1]
     if missed.any() or not inside.size:
@@ -96,7 +96,7 @@ def _placed(
 
 
 def _words(times: NDArray[np.float64] | None) -> str:
-    if times is None or times.size < 2:
+    if times is None:
         return "at times that the file does not say"
-    step = np.median(np.diff(times))
+    step = np.median(np.diff(times)) if times.size > 1 else 0.0
     return f"from {times[0]:.6g} to {times[-1]:.6g} s in steps of {step:.6g} s"

@@ -59,15 +59,17 @@ class _Members:
         """Names and values of what a group holds itself."""
         check_limit(self._file, "columns", len(group))
         out: dict[str, Variable] = {}
-        for name in group:
+        for key in group:
+            # h5py leaves a name as bytes that is no UTF-8.
+            name = key if isinstance(key, str) else key.decode("utf-8", "replace")
             # A soft or external link may lead out of the file, or round in a circle.
-            hard = isinstance(group.get(name, getlink=True), self._h5py.HardLink)
+            hard = isinstance(group.get(key, getlink=True), self._h5py.HardLink)
             if name.startswith(_HIDDEN) or not hard:
                 continue
-            address = self._h5py.h5o.get_info(group[name].id).addr
+            address = self._h5py.h5o.get_info(group[key].id).addr
             if address not in self._seen:
                 self._seen.add(address)
-                value = self._value(group[name], depth)
+                value = self._value(group[key], depth)
                 out |= _field(name, value, _frame_names(group, name))
         return out
 
@@ -87,7 +89,7 @@ class _Members:
 
     def _structures(self, group: Any, depth: int) -> Variable:  # noqa: ANN401
         """A group as one structure; MATLAB's arrays of structures hold a reference an element."""
-        fields = {name: group[name] for name in group if _refers(self._h5py, group, name)}
+        fields = {str(key): group[key] for key in group if _refers(self._h5py, group, key)}
         if not fields:
             return [self.of(group, depth + 1)]
         size = max(field.size for field in fields.values())

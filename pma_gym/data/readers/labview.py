@@ -165,14 +165,14 @@ def _on_one_clock(
     multi = len(filled) > 1
     channels: list[Channel] = []
     for position, i in enumerate(signals):
-        cells = columns[i]
-        while cells and not cells[-1]:
-            cells = cells[:-1]
-        stamps = columns[max((x for x in xs if x < i), default=xs[0])][: len(cells)]
-        times = (
-            _numbers(stamps, mark) if multi else _header_times(header, position, len(cells), mark)
-        )
-        if multi and times is None and stamps != columns[xs[0]][: len(cells)]:
+        count = max((k for k, cell in enumerate(columns[i], start=1) if cell), default=0)
+        cells = columns[i][:count]
+        stamps = columns[max((x for x in xs if x < i), default=xs[0])][:count]
+        if multi:
+            times = _numbers(stamps, mark)
+        else:
+            times = _header_times(header, position, count, mark)
+        if multi and times is None and stamps != columns[xs[0]][:count]:
             raise UnreadableError(
                 f"{names[i]!r} of {file} has other times than the first channel, and they are no "
                 "numbers; save the file with relative times"
@@ -216,7 +216,7 @@ def _header_times(
         return entries[position] if position < len(entries) - 1 else entries[0]
 
     step, start = cell_number(entry("delta_x"), mark), cell_number(entry("x0"), mark)
-    if not step or not step > 0 or start is None:
+    if step is None or start is None or not 0.0 < step < np.inf or abs(start) == np.inf:
         return None
     dated = zip(header.get("date", ()), header.get("time", ()), strict=False)
     shifts = clock_seconds([f"{date} {time[:_LONGEST_TIME]}" for date, time in dated])

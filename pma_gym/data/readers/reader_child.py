@@ -37,8 +37,8 @@ def serve() -> None:
             for name in [name for name in os.environ if name.startswith(PREFIX)]:
                 del os.environ[name]
             os.environ.update(asked["limits"])
-            limited = _limit_process(asked["size"])
             content = source.read(asked["size"])
+            limited = _limit_process(asked["size"])
             read = importlib.import_module(f"pma_gym.data.readers.{asked['kind']}").read
             try:
                 tables = read(content, asked["file"], request_of(asked["request"]))
@@ -53,12 +53,13 @@ def serve() -> None:
             send_error(sink, error)
         except MemoryError:
             os._exit(OUT_OF_MEMORY)
+        finally:
+            _alarm(0)
 
 
 def _limit_process(size: int) -> bool:
     """Limit memory and time for a file; whether the operating system limits memory."""
-    if hasattr(signal, "alarm"):
-        signal.alarm(limit("reading_s") + _GRACE_S)
+    _alarm(limit("reading_s") + _GRACE_S)
     try:
         import resource
     except ImportError:
@@ -74,3 +75,9 @@ def _limit_process(size: int) -> bool:
     except (OSError, MemoryError):
         return True
     return False
+
+
+def _alarm(seconds: int) -> None:
+    """End the process after some seconds, where the operating system can; 0: never."""
+    if hasattr(signal, "alarm"):
+        signal.alarm(seconds)

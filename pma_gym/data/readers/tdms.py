@@ -54,11 +54,12 @@ def _table(group: Any, file: str, part: str, request: Request) -> Table:  # noqa
     signals = [
         Channel(name, _cells(channel), _times(channel, min(starts, default=None)))
         for name, channel in channels.items()
+        if len(channel)
     ]
     time = next((signal for signal in signals if request.is_time(signal.name)), None)
     others = [signal for signal in signals if signal is not time]
     rows = reference_times(others, request)
-    lengths = [len(signal.cells) for signal in others if len(signal.cells)]
+    lengths = [len(signal.cells) for signal in others]
     if time is not None:
         size = len(time.cells)
         if rows is None or rows.size != size:
@@ -70,7 +71,7 @@ def _table(group: Any, file: str, part: str, request: Request) -> Table:  # noqa
     remarks = []
     for signal in others:
         cells, said = signal.cells, ""
-        if rows is not None and (signal.times is not None or time is None) and len(cells):
+        if rows is not None and (signal.times is not None or time is None):
             cells, said = on_rows(signal, rows, request, file)
         elif len(cells) != size:
             said = (
@@ -109,9 +110,13 @@ def _times(channel: Any, first: np.datetime64 | None) -> NDArray[np.float64] | N
     """Times of a waveform (s) after the first start in the file; None if a property is missing."""
     start, step, shift = (
         channel.properties.get(name, usual)
-        for name, usual in ((_START, first), ("wf_increment", None), ("wf_start_offset", 0.0))
+        for name, usual in ((_START, None), ("wf_increment", None), ("wf_start_offset", 0.0))
     )
-    if not all(isinstance(x, int | float) and np.isfinite(x) for x in (shift, step)) or step <= 0:
+    if (
+        (start is None) != (first is None)
+        or not all(isinstance(x, int | float) and np.isfinite(x) for x in (shift, step))
+        or step <= 0
+    ):
         return None
     shift += 0.0 if first is None else (start - first) / np.timedelta64(1, "s")
     return shift + step * np.arange(len(channel))

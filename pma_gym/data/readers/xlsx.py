@@ -10,6 +10,7 @@ import io
 import zipfile
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import cache
 from typing import Any
 
 from pma_gym.data.readers.layout import Row, arrange
@@ -49,7 +50,8 @@ def read(content: bytes, file: str, request: Request) -> list[Table]:
     check_limit(file, "table_mib", unpacked / 2**20)
     if unpacked > _SMALL_MIB * 2**20:
         check_limit(file, "packing", unpacked / len(content))
-    values = _book(content, file, True)
+    book = cache(lambda data_only: _book(content, file, data_only))
+    values = book(True)
     check_limit(file, "sheets", len(values.worksheets))
     notes: dict[str, str] = {}
     sheets: list[tuple[str, bool, list[Row], set[tuple[int, int]]]] = []
@@ -60,7 +62,7 @@ def read(content: bytes, file: str, request: Request) -> list[Table]:
         if title == PROVENANCE:
             notes = {str(row[0]): _text(row[1:2]) for _, row in rows if row[0] is not None}
         elif rows:
-            unstored = empty and empty & set(_formulas(_book(content, file, False)[sheet.title]))
+            unstored = empty and empty & set(_formulas(book(False)[sheet.title]))
             sheets.append((title, sheet.sheet_state != "visible", rows, unstored))
     return _arranged(sheets, file, request, notes)
 
