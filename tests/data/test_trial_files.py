@@ -285,11 +285,11 @@ def test_a_damaged_file_is_named(suffix, tmp_path):
     path = tmp_path / f"trial{suffix}"
     with pytest.raises(TrialError, match=f"trial{suffix} is empty"):
         read_trial(written(tmp_path, "", path.name))
-    with pytest.raises(TrialError, match=f"trial{suffix} is not a readable"):
+    with pytest.raises(TrialError, match=f"trial{suffix} cannot be read: damaged"):
         read_trial(written(tmp_path, "time_s,load_n\n", path.name))
     write_trial(Trial(np.arange(3.0), {"load_command": np.arange(3.0)}), path)
     path.write_bytes(path.read_bytes()[:-40])
-    with pytest.raises(TrialError, match=f"trial{suffix} is not a readable"):
+    with pytest.raises(TrialError, match=f"trial{suffix} cannot be read: damaged"):
         read_trial(path)
 
 

@@ -21,7 +21,9 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from pma_gym.data.files.trial_files import read_trial, write_trial
+from pma_gym.data.files.trial_files import trial_of, write_trial
+from pma_gym.data.files.trial_loading import load_tables
+from pma_gym.data.readers.table import FileFormat
 from pma_gym.data.trial import Trial, TrialError
 
 EXAMPLES = int(os.environ.get("PMA_GYM_FUZZ_EXAMPLES", "60"))
@@ -85,16 +87,8 @@ def binary_seeds(suffix):
                 savemat(made, content, do_compression=packed)
                 out.append(made.getvalue())
         return out
-    if suffix == ".h5":
-        h5py = pytest.importorskip("h5py")
-        out = []
-        for packed in (None, "gzip"):
-            made = io.BytesIO()
-            with h5py.File(made, "w") as file:
-                for name, values in columns().items():
-                    file.create_dataset(f"log/{name}", data=values, compression=packed)
-            out.append(made.getvalue())
-        return out
+    if suffix in (".h5", ".73.mat"):
+        return _hdf5_seeds(matlab=suffix == ".73.mat")
     if suffix == ".tdms":
         nptdms = pytest.importorskip("nptdms")
         out = []
@@ -114,6 +108,37 @@ def binary_seeds(suffix):
             out.append(made.getvalue())
         return out
     return _written(suffix)
+
+
+def _hdf5_seeds(matlab):
+    """Files of version 7.3 with structures and arrays of them; else groups and compound tables."""
+    h5py = pytest.importorskip("h5py")
+    out = []
+    for packing in (
+        {},
+        {"compression": "gzip"},
+        {"compression": "gzip", "shuffle": True, "fletcher32": True, "chunks": True},
+    ):
+        made = io.BytesIO()
+        with h5py.File(made, "w", userblock_size=512 if matlab else 0) as file:
+            table = np.zeros(ROWS, [(name, "f8") for name in columns()])
+            for name, values in columns().items():
+                table[name] = values
+                file.create_dataset(f"log/{name}", data=values[None, :], **packing)
+                if matlab:
+                    refs = np.zeros((1, 2), h5py.ref_dtype)
+                    for k in range(2):
+                        file[f"#refs#/{name}{k}"] = values[None, :]
+                        refs[0, k] = file[f"#refs#/{name}{k}"].ref
+                    file[f"runs/{name}"] = refs
+            if matlab:
+                for name in ("log", "runs"):
+                    file[name].attrs["MATLAB_class"] = np.bytes_(b"struct")
+            else:
+                file.create_dataset("table", data=table, **packing)
+                file["notes"], file["kinds"] = "N. N.", np.array([b"a", b"b"])
+        out.append(made.getvalue())
+    return out
 
 
 def _written(suffix):
@@ -249,8 +274,8 @@ def check(suffix, content, folder, counts=None):
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         try:
-            trial = read_trial(path)
-            assert isinstance(trial, Trial)
+            for table in load_tables(path):
+                assert isinstance(trial_of(table, {}, FileFormat()), Trial)
             result = "read"
         except TrialError as error:
             assert str(error)
@@ -266,6 +291,7 @@ CHANGES = {
     ".parquet": (change_bytes,),
     ".mat": (change_bytes, change_mat),
     ".h5": (change_bytes,),
+    ".73.mat": (change_bytes,),
     ".tdms": (change_bytes,),
 }
 

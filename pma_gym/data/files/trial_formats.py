@@ -14,13 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pma_gym.data.readers.delimited import read_text
-from pma_gym.data.readers.hdf5 import read_hdf5
 from pma_gym.data.readers.libraries import needed
-from pma_gym.data.readers.matlab import read_mat
-from pma_gym.data.readers.parquet.parquet import read_parquet
+from pma_gym.data.readers.reader_process import binary_reader
 from pma_gym.data.readers.table import PROVENANCE, Request, Table
-from pma_gym.data.readers.tdms import read_tdms
-from pma_gym.data.readers.xlsx.workbook import read_xlsx
 
 __all__ = ["DECODERS", "ENCODERS", "PROVENANCE", "Columns", "Reader", "Table"]
 
@@ -85,13 +81,13 @@ DECODERS: dict[str, Reader] = {
     ".tsv": read_text,
     ".dat": read_text,
     ".lvm": read_text,
-    ".parquet": read_parquet,
-    ".xlsx": read_xlsx,
-    ".xlsm": read_xlsx,
-    ".mat": read_mat,
-    ".h5": read_hdf5,
-    ".hdf5": read_hdf5,
-    ".tdms": read_tdms,
+    ".parquet": binary_reader("parquet"),
+    ".xlsx": binary_reader("xlsx"),
+    ".xlsm": binary_reader("xlsx"),
+    ".mat": binary_reader("matlab"),
+    ".h5": binary_reader("hdf5"),
+    ".hdf5": binary_reader("hdf5"),
+    ".tdms": binary_reader("tdms"),
 }
 """Reader of each kind of file, by suffix."""
 

@@ -48,8 +48,6 @@ EPOCHS = ((1e9, 5e9, 1.0, "seconds"), (1e12, 5e12, 1e-3, "milliseconds"),
 
 def looks_like_clock(cell: object) -> bool:
     """Test whether a cell holds a date or a time of day."""
-    if isinstance(cell, datetime.datetime | datetime.time | datetime.timedelta):
-        return True
     return isinstance(cell, str) and any(_match(form, cell) for form in _FORMS)
 
 
@@ -62,7 +60,7 @@ def clock_seconds(cells: Cells) -> NDArray[np.float64] | None:
         Seconds, shape (n,), NaN where a cell is empty. None if the cells are plain numbers, are not
         all of one form, or leave open what is the day and what the month.
     """
-    stamps = _objects(cells) if _holds_objects(cells) else _texts(cells)
+    stamps = _texts(cells)
     if stamps is None or all(stamp is None for stamp in stamps):
         return None
     first = next(stamp for stamp in stamps if stamp is not None)
@@ -82,37 +80,6 @@ def epoch_seconds(values: NDArray[np.float64]) -> tuple[NDArray[np.float64], str
         if low <= first < high:
             return (values - first) * scale, name
     return None
-
-
-def _holds_objects(cells: Cells) -> bool:
-    kinds = datetime.datetime | datetime.time | datetime.timedelta
-    return any(isinstance(cell, kinds) for cell in cells)
-
-
-def _objects(cells: Cells) -> list[int | None] | None:
-    """Nanoseconds of a spreadsheet's dates, times of day or durations; None if they are mixed."""
-    if len({type(cell) for cell in cells if cell is not None}) != 1:
-        return None
-    stamps: list[int | None] = []
-    for cell in cells:
-        if cell is None:
-            stamps.append(None)
-        elif isinstance(cell, datetime.datetime):
-            stamps.append(_of_delta(cell - datetime.datetime(1970, 1, 1, tzinfo=cell.tzinfo)))
-        elif isinstance(cell, datetime.time):
-            seconds = (cell.hour * 60 + cell.minute) * 60 + cell.second
-            stamps.append(seconds * _NS + cell.microsecond * 1000)
-        elif isinstance(cell, datetime.timedelta):
-            stamps.append(_of_delta(cell))
-    return _past_end(stamps, _DAY_NS) if isinstance(_first(cells), datetime.time) else stamps
-
-
-def _first(cells: Cells) -> object:
-    return next((cell for cell in cells if cell is not None), None)
-
-
-def _of_delta(delta: datetime.timedelta) -> int:
-    return (delta.days * 86_400 + delta.seconds) * _NS + delta.microseconds * 1000
 
 
 def _texts(cells: Cells) -> list[int | None] | None:

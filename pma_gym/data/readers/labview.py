@@ -8,7 +8,12 @@ A header of the file, then segments, each with a header of its own; every header
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+from numpy.typing import NDArray
+
 from pma_gym.data.readers.cells import cell_number
+from pma_gym.data.readers.channel_clocks import Channel, on_rows, reference_times
+from pma_gym.data.readers.clock import clock_seconds
 from pma_gym.data.readers.layout import Row, arrange
 from pma_gym.data.readers.table import Request, Table, UnreadableError
 from pma_gym.data.readers.text_lines import check_widths, split_lines
@@ -17,6 +22,7 @@ from pma_gym.limits import check_limit
 END = "***end_of_header***"
 TIME, COMMENT = "X_Value", "Comment"
 _NAMES = {"tab": "\t", "comma": ",", "semicolon": ";"}
+_LONGEST_TIME = len("10:11:12.123456789")
 _LONGEST_HEADER = 500
 """Lines of a header."""
 
@@ -128,58 +134,103 @@ def _table(segment: _Segment, file: str, request: Request, number: int) -> Table
     """The table of a segment."""
     if not segment.rows:
         return Table(file, [], [], [], part=str(number))
-    names = segment.rows[0][1]
-    rows = segment.rows
+    header, rows, remarks = segment.header, segment.rows, []
+    names = [str(name) for name in rows[0][1]]
     if TIME in names and not any(request.is_time(name) for name in names):
-        dimension = next((x for x in segment.header.get("x_dimension", ()) if x), "time").lower()
+        dimension = next((x for x in header.get("x_dimension", ()) if x), "time").lower()
         if dimension == "time" and not request.is_known(TIME):
-            names = ["time_s" if name == TIME else name for name in names]
-            rows = [(rows[0][0], names), *rows[1:]]
-    rows = _without_extra_times(rows, file)
-    rows = _with_times(rows, segment.header, request)
-    table = arrange(file, rows, request, part=str(number), padded=True)
-    return _with_units(_without_comments(table), segment.header)
+            rows, remarks = _on_one_clock(rows, header, request, file)
+    table = _without_comments(arrange(file, rows, request, part=str(number), padded=True))
+    channels = [name for name in names if name != TIME]
+    labels = dict(zip(channels, header.get("y_unit_label", ()), strict=False))
+    units = {i: labels[name] for i, name in enumerate(table.header) if labels.get(name)}
+    remarks = (*table.remarks, *remarks)
+    return replace(table, units={**units, **table.units}, remarks=remarks)
 
 
-def _without_extra_times(rows: list[Row], file: str) -> list[Row]:
-    """Rows with one column of times, where the file has one for each channel and all are equal."""
-    names = list(rows[0][1])
-    at = [i for i, name in enumerate(names) if name == "time_s"]
-    if len(at) < 2:
-        return rows
-    for number, row in rows[1:]:
-        stamps = {row[i] for i in at if i < len(row) and row[i]}
-        if len(stamps) > 1:
-            raise UnreadableError(
-                f"row {number} of {file} has a time for each channel, and they differ; save the "
-                "file with X_Columns One"
-            )
-    gone = set(at[1:])
-    return [(number, [c for i, c in enumerate(row) if i not in gone]) for number, row in rows]
+def _on_one_clock(
+    rows: list[Row], header: Header, request: Request, file: str
+) -> tuple[list[Row], list[str]]:
+    """Rows with one column of times, and each channel's readings in the rows of their times.
 
-
-def _with_times(rows: list[Row], header: Header, request: Request) -> list[Row]:
-    """Rows with the times that X0 and Delta_X give, where the file leaves their column empty."""
-    names = list(rows[0][1])
-    if "time_s" not in names:
-        return rows
-    at = names.index("time_s")
-    if any(at < len(row) and row[at] for _, row in rows[1:]):
-        return rows
+    `X_Value` says the times of the channel to its right (X_Columns Multi), or of the first (One).
+    The header's X0, Delta_X, Date and Time say those of all channels (One, No).
+    """
+    names = [str(name) for name in rows[0][1]]
+    columns = [[row[i] if i < len(row) else "" for _, row in rows[1:]] for i in range(len(names))]
+    xs = [i for i, name in enumerate(names) if name == TIME]
+    signals = [i for i, name in enumerate(names) if name not in (TIME, COMMENT, "")]
     mark = request.format.decimal or "."
-    start, step = (
-        cell_number(next((x for x in header.get(key, ()) if x), ""), mark)
-        for key in ("x0", "delta_x")
-    )
-    if not step or start is None or step != step:
-        return rows
-    start = 0.0 if start != start else start
-    filled: list[Row] = [rows[0]]
-    for index, (number, row) in enumerate(rows[1:]):
-        cells: list[object] = list(row) + [""] * (at + 1 - len(row))
-        cells[at] = start + index * step
-        filled.append((number, cells))
-    return filled
+    filled = [i for i in xs if any(columns[i])]
+    multi = len(filled) > 1
+    channels: list[Channel] = []
+    for position, i in enumerate(signals):
+        count = max((k for k, cell in enumerate(columns[i], start=1) if cell), default=0)
+        cells = columns[i][:count]
+        stamps = columns[max((x for x in xs if x < i), default=xs[0])][:count]
+        if multi:
+            times = _numbers(stamps, mark)
+        else:
+            times = _header_times(header, position, count, mark)
+        if multi and times is None and stamps != columns[xs[0]][:count]:
+            raise UnreadableError(
+                f"{names[i]!r} of {file} has other times than the first channel, and they are no "
+                "numbers; save the file with relative times"
+            )
+        channels.append(Channel(names[i], cells, times))
+    if filled and not multi:
+        clock = _header_times(header, 0, len(rows) - 1, mark)
+    else:
+        clock = reference_times(channels, request)
+    if clock is not None and len(filled) != 1:
+        columns[xs[0]] = clock.tolist()
+    names[xs[0]] = "time_s"
+    gone, remarks = set(xs[1:]), []
+    for i, channel in zip(signals, channels, strict=True):
+        if clock is None or not channel.cells:
+            continue
+        cells, said = on_rows(channel, clock, request, file)
+        remarks += [said] if said else []
+        if cells is None:
+            gone.add(i)
+        else:
+            columns[i] = list(cells)
+    kept = [i for i in range(len(names)) if i not in gone]
+    size = len(columns[xs[0]])
+    return [
+        (rows[0][0], [names[i] for i in kept]),
+        *(
+            (rows[k + 1][0], [columns[i][k] if k < len(columns[i]) else "" for i in kept])
+            for k in range(size)
+        ),
+    ], remarks
+
+
+def _header_times(
+    header: Header, position: int, count: int, mark: str
+) -> NDArray[np.float64] | None:
+    """A channel's times (s) after the first channel's Date and Time; None without a Delta_X."""
+
+    def entry(key: str) -> str:
+        entries = [*header.get(key, ()), ""]
+        return entries[position] if position < len(entries) - 1 else entries[0]
+
+    step, start = cell_number(entry("delta_x"), mark), cell_number(entry("x0"), mark)
+    if step is None or start is None or not 0.0 < step < np.inf or abs(start) == np.inf:
+        return None
+    dated = zip(header.get("date", ()), header.get("time", ()), strict=False)
+    shifts = clock_seconds([f"{date} {time[:_LONGEST_TIME]}" for date, time in dated])
+    shift = 0.0 if shifts is None or position >= shifts.size else float(shifts[position])
+    return shift + (0.0 if start != start else start) + step * np.arange(count, dtype=np.float64)
+
+
+def _numbers(cells: Sequence[object], mark: str) -> NDArray[np.float64] | None:
+    """Increasing numbers of cells; None if they are anything else."""
+    values = [cell_number(cell, mark) for cell in cells]
+    if not values or any(value is None for value in values):
+        return None
+    times = np.array(values, dtype=float)
+    return times if np.all(np.diff(times) > 0) else None
 
 
 def _without_comments(table: Table) -> Table:
@@ -204,14 +255,6 @@ def _without_comments(table: Table) -> Table:
         cells=[table.cells[i] for i in keep],
         remarks=(*table.remarks, *said),
     )
-
-
-def _with_units(table: Table, header: Header) -> Table:
-    """The table with the units that a segment's header gives, one a channel."""
-    labels = header.get("y_unit_label", ())
-    channels = [i for i, name in enumerate(table.header) if name != "time_s"]
-    units = {i: label for i, label in zip(channels, labels, strict=False) if label}
-    return replace(table, units={**units, **table.units})
 
 
 def _joined(tables: Sequence[Table], file: str, request: Request) -> Table | None:

@@ -41,6 +41,14 @@ class UnreadableError(TrialError):
     """A file that holds no table at all: damaged, of another kind, or its library is missing."""
 
 
+def damaged(file: str, happened: str) -> UnreadableError:
+    """What to say of a file that its library cannot read."""
+    return UnreadableError(
+        f"{file} cannot be read: damaged or not what its name says ({happened}); write it again, "
+        "or save the trial as CSV"
+    )
+
+
 class NoHeaderError(TrialError):
     """A table that begins with its samples, so that nothing names its columns."""
 
@@ -84,11 +92,14 @@ class Request:
 
     def is_time(self, name: object) -> bool:
         """Test whether a header's name is that of the time."""
-        if not isinstance(name, str):
-            return False
-        entry = self.columns.get(name)
+        return self.kind(name) == "time"
+
+    def kind(self, name: object) -> str:
+        """What a column is by its name: "time", "command", "measurement"; empty if not known."""
+        entry = self.columns.get(name, name) if isinstance(name, str) else None
         ours = entry.get("name", name) if isinstance(entry, Mapping) else entry
-        return (name if entry is None else ours) == "time_s"
+        column = BY_NAME.get(ours) if isinstance(ours, str) else None
+        return column.kind if column else ""
 
 
 @dataclass(frozen=True)

@@ -1,24 +1,26 @@
 """National Instruments' TDMS files: channels of a group are columns."""
 
 import io
-import logging
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from pma_gym.data.readers.channel_clocks import Channel, on_rows, reference_times
+from pma_gym.data.readers.clock import clock_seconds
 from pma_gym.data.readers.libraries import needed
-from pma_gym.data.readers.table import PART, Cells, Request, Table, UnreadableError
-from pma_gym.data.trial_columns import TrialError
-from pma_gym.limits import LimitError, check_limit
+from pma_gym.data.readers.table import PART, Cells, Request, Table
+from pma_gym.data.readers.variables import NUMBERS
+from pma_gym.limits import check_limit
 
-_WIDEST = 16
-"""Bytes of the widest value that a channel holds."""
+_START = "wf_start_time"
 
 
-def read_tdms(content: bytes, file: str, request: Request = Request()) -> list[Table]:  # noqa: B008
+def read(content: bytes, file: str, request: Request) -> list[Table]:
     """The tables in a TDMS file, one a group that has channels.
 
-    Where no channel is the time, the waveform's `wf_start_offset` and `wf_increment` give it.
+    Where no channel is the time, the waveforms' `wf_start_time`, `wf_start_offset` and
+    `wf_increment` give it; a channel whose own differ is shifted to the rows of its times.
 
     Args:
         content: bytes of the file.
@@ -27,91 +29,100 @@ def read_tdms(content: bytes, file: str, request: Request = Request()) -> list[T
     Returns:
         Tables.
     Raises:
-        TrialError: npTDMS is missing or cannot read it, or it is beyond a limit.
+        TrialError: npTDMS is missing, or a channel fits no row.
+        LimitError: beyond a limit.
     """
     nptdms = needed("nptdms", file)
-    _silence()
-    try:
-        with nptdms.TdmsFile.open(io.BytesIO(content)) as source:
-            tables = _tables(source, file, request, len(content))
-    except (TrialError, LimitError):
-        raise
-    # npTDMS raises ValueError, KeyError, struct.error, IndexError... for damaged files.
-    except Exception as error:
-        said = str(error).partition("\n")[0][:200] or type(error).__name__
-        raise UnreadableError(f"{file} is not a readable TDMS file: {said}") from None
+    with nptdms.TdmsFile.open(io.BytesIO(content)) as source:
+        groups = [group for group in source.groups() if any(len(c) for c in group.channels())]
+        check_limit(file, "sheets", len(groups))
+        tables = []
+        for group in groups:
+            part = group.name.replace("/", "_")
+            label = f"{file}{PART}{part}" if len(groups) > 1 else file
+            tables.append(_table(group, label, part, request))
     if not tables:
-        raise UnreadableError(
-            f"{file} is not a readable TDMS file: it holds no channel with values"
-        )
+        raise ValueError("it holds no channel with values")
     return tables
 
 
-def _silence() -> None:
-    """Keep npTDMS from printing a line for each oddity of each segment: one message is enough."""
-    for name in list(logging.root.manager.loggerDict):
-        if name.partition(".")[0] == "nptdms":
-            logging.getLogger(name).setLevel(logging.CRITICAL)
-
-
-def _tables(source: Any, file: str, request: Request, size: int) -> list[Table]:  # noqa: ANN401
-    groups = [group for group in source.groups() if any(len(c) for c in group.channels())]
-    check_limit(file, "sheets", len(groups))
-    tables = []
-    for group in groups:
-        part = group.name.replace("/", "_")
-        label = f"{file}{PART}{part}" if len(groups) > 1 else file
-        tables.append(_table(group, label, part, request, size))
-    return tables
-
-
-def _table(group: Any, file: str, part: str, request: Request, size: int) -> Table:  # noqa: ANN401
-    channels = [channel for channel in group.channels() if len(channel)]
+def _table(group: Any, file: str, part: str, request: Request) -> Table:  # noqa: ANN401
+    channels = {channel.name: channel for channel in group.channels()}
     check_limit(file, "columns", len(channels))
-    lengths = [len(channel) for channel in channels]
-    # Values are not packed: a file cannot hold more of them than it has bits.
-    if sum(lengths) > 8 * size:
-        raise ValueError(f"it declares {sum(lengths)} values in {size} bytes")
-    check_limit(file, "cells", sum(lengths))
-    time = next((c for c in channels if request.is_time(c.name)), None)
-    rows = len(time) if time is not None else max(lengths, key=lengths.count)
-    taken = [channel for channel in channels if len(channel) == rows]
-    header = [channel.name for channel in taken]
-    cells: list[Cells] = [_cells(channel) for channel in taken]
-    remarks = [
-        f"the channel {c.name!r} is passed over, it has {len(c)} values for {rows}"
-        for c in channels
-        if len(c) != rows
+    check_limit(file, "cells", sum(map(len, channels.values())))
+    starts = [c.properties[_START] for c in channels.values() if _START in c.properties]
+    signals = [
+        Channel(name, _cells(channel), _times(channel, min(starts, default=None)))
+        for name, channel in channels.items()
+        if len(channel)
     ]
-    units = {i: str(c.properties.get("unit_string", "")) for i, c in enumerate(taken)}
-    clock = None if time is not None else _waveform(taken, rows)
-    if clock is not None and "time_s" not in header:
-        header, cells = ["time_s", *header], [clock, *cells]
-        units = {i + 1: unit for i, unit in units.items()}
-    units = {i: unit for i, unit in units.items() if unit}
+    time = next((signal for signal in signals if request.is_time(signal.name)), None)
+    others = [signal for signal in signals if signal is not time]
+    rows = reference_times(others, request)
+    lengths = [len(signal.cells) for signal in others]
+    if time is not None:
+        size = len(time.cells)
+        if rows is None or rows.size != size:
+            rows = _seconds(time.cells)
+        columns: dict[str, Cells] = {time.name: time.cells}
+    else:
+        size = max(lengths, key=lengths.count) if rows is None else rows.size
+        columns = {} if rows is None else {"time_s": rows}
+    remarks = []
+    for signal in others:
+        cells, said = signal.cells, ""
+        if rows is not None and (signal.times is not None or time is None):
+            cells, said = on_rows(signal, rows, request, file)
+        elif len(cells) != size:
+            said = (
+                f"the channel {signal.name!r} is passed over, it has {len(cells)} values for {size}"
+            )
+            cells = None
+        if cells is not None:
+            columns[signal.name] = cells
+        remarks += [said] if said else []
+    named = [
+        str(channels[n].properties.get("unit_string", "")) if n in channels else "" for n in columns
+    ]
+    units = {i: unit for i, unit in enumerate(named) if unit}
     return Table(
-        file, header, cells, range(1, rows + 1), part=part, units=units, remarks=tuple(remarks)
+        file,
+        list(columns),
+        list(columns.values()),
+        range(1, size + 1),
+        part=part,
+        units=units,
+        remarks=tuple(remarks),
     )
 
 
 def _cells(channel: Any) -> Cells:  # noqa: ANN401
-    """A channel's values: numbers, or dates as datetimes."""
+    """A channel's values: numbers, or texts; dates are texts."""
     values = channel[:]
-    if values.dtype.kind in "fiu":
+    if values.dtype.kind in NUMBERS:
         return np.asarray(values, dtype=np.float64)
     if values.dtype.kind == "M":
-        return values.astype("datetime64[us]").tolist()
+        return np.datetime_as_string(values, unit="us").tolist()
     return [str(value)[:200] for value in values.tolist()]
 
 
-def _waveform(channels: Any, rows: int) -> np.ndarray | None:  # noqa: ANN401
-    """Times of waveforms (s), if all channels have the same."""
-    clocks = {
-        (c.properties.get("wf_start_offset", 0.0), c.properties.get("wf_increment"))
-        for c in channels
-    }
-    if len(clocks) != 1:
+def _times(channel: Any, first: np.datetime64 | None) -> NDArray[np.float64] | None:  # noqa: ANN401
+    """Times of a waveform (s) after the first start in the file; None if a property is missing."""
+    start, step, shift = (
+        channel.properties.get(name, usual)
+        for name, usual in ((_START, None), ("wf_increment", None), ("wf_start_offset", 0.0))
+    )
+    if (
+        (start is None) != (first is None)
+        or not all(isinstance(x, int | float) and np.isfinite(x) for x in (shift, step))
+        or step <= 0
+    ):
         return None
-    start, step = next(iter(clocks))
-    good = all(isinstance(x, int | float) and np.isfinite(x) for x in (start, step))
-    return start + step * np.arange(rows) if good and step > 0 else None
+    shift += 0.0 if first is None else (start - first) / np.timedelta64(1, "s")
+    return shift + step * np.arange(len(channel))
+
+
+def _seconds(cells: Cells) -> NDArray[np.float64] | None:
+    """Seconds from the first row of a time channel; None where they do not increase."""
+    times = cells - cells[0] if isinstance(cells, np.ndarray) else clock_seconds(cells)
+    return times if times is not None and np.all(np.diff(times) > 0) else None

@@ -512,6 +512,54 @@ def test_a_time_by_another_name_and_unit_gets_its_line(tmp_path):
     assert_allclose(trial.trial.time, TIME / 1e3)
 
 
+@pytest.mark.parametrize(
+    ("header", "other", "rows", "readings"),
+    [
+        ("Delta_X", "0.04", slice(None, None, 2), slice(None, ROWS // 2)),
+        ("X0", "0.04", slice(2, None), slice(None, -2)),
+        ("Time", "10:11:12.06", slice(2, None), slice(None, -2)),
+        ("Delta_X", "0.01", slice(None), None),
+        ("X0", "0.01", slice(None), None),
+    ],
+)
+@pytest.mark.parametrize("columns", ["One", "No"])
+def test_labview_channels_with_clocks_of_their_own(
+    tmp_path, columns, header, other, rows, readings
+):
+    clock = {"Time": ["10:11:12.02"] * 3, "X0": ["0"] * 3, "Delta_X": ["0.02"] * 3}
+    clock[header][1] = other
+    lines = [
+        line for line in labview(columns=columns).split("\n") if line.split("\t")[0] not in clock
+    ]
+    at = next(i for i, line in enumerate(lines) if line.startswith("Channels"))
+    made = ["\t".join([name, *entries]) for name, entries in clock.items()]
+    lines[at + 1 : at + 1] = ["\t".join(["Date", *["2026/03/01"] * 3]), *made]
+    if readings is None:
+        message = refused(tmp_path, "\n".join(lines), name="a.lvm")
+        assert "'contraction_mm' has readings from" in message
+        assert "s in steps of 0.02 s: the reading at 0.01 s has no row of a.lvm" in message
+        return
+    with pytest.warns(
+        TrialWarning, match="'contraction_mm' has readings .* in the rows of their times"
+    ):
+        trial = read_trial(save(tmp_path, "\n".join(lines), "a.lvm"))
+    expected = np.full(ROWS, np.nan)
+    expected[rows] = VALUES[readings, 2] / 1e3
+    assert_allclose(trial.measurements["contraction"], expected)
+    assert_allclose(trial.measurements["load"], VALUES[:, 3])
+
+
+def test_labview_channels_with_one_reading_or_none(tmp_path):
+    lines = labview(columns="No").split("\n")
+    at = next(i for i, line in enumerate(lines) if line.startswith("X_Value"))
+    one = "\n".join(lines[: at + 2])
+    assert read_trial(save(tmp_path, one, "a.lvm")).time.tolist() == [0.0]
+    voltage, contraction, load = lines[at + 1].split("\t")[1:4]
+    none = "\n".join([*lines[: at + 1], f"\t{voltage}\t\t{load}", f"\t{voltage}\t\t"])
+    with pytest.warns(TrialWarning, match="'load_n' has readings from 0 to 0 s"):
+        assert len(read_trial(save(tmp_path, none, "a.lvm"))) == 2
+
+
 def test_labview_files_with_a_time_for_each_channel_are_read(tmp_path):
     content = labview(columns="Multi").split("\n")
     at = next(i for i, line in enumerate(content) if line.startswith("X_Value"))
@@ -520,6 +568,6 @@ def test_labview_files_with_a_time_for_each_channel_are_read(tmp_path):
         content[i] = "\t".join(part for cell in cells for part in (first, cell))
     check(read_trial(save(tmp_path, "\n".join(content), "a.lvm")))
     content[at + 3] = content[at + 3].replace("\t0.040\t", "\t0.050\t", 1)
-    assert "has a time for each channel, and they differ; save the file with X_Columns One" in (
-        refused(tmp_path, "\n".join(content), name="a.lvm")
-    )
+    message = refused(tmp_path, "\n".join(content), name="a.lvm")
+    assert "'contraction_mm' has readings from 0" in message
+    assert "the reading at 0.05 s has no row of a.lvm to stand in" in message

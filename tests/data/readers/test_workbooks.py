@@ -4,6 +4,7 @@ import datetime
 import io
 import re
 import zipfile
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -45,6 +46,7 @@ def patched(path, part, change):
 
 
 SHEET = "xl/worksheets/sheet1.xml"
+TEXTS = b"application/vnd.openxmlformats-officedocument.spreadsheetml.sharedStrings+xml"
 
 
 def check(trial, rows=ROWS):
@@ -165,9 +167,12 @@ def test_texts_of_all_kinds_are_read(tmp_path):
     )
     texts = (
         b'<sst xmlns="http://schemas.openxmlformats.org/spreadsheetml/2006/main"><si><t>time_s</t>'
-        b"<rPh><t>spoken</t></rPh></si><si><r><t>motor_</t></r><r><t>voltage_v</t></r></si></sst>"
+        b'<rPh sb="0" eb="1"><t>spoken</t></rPh></si><si><r><t>motor_</t></r><r><t>voltage_v</t>'
+        b"</r></si></sst>"
     )
     patched(path, SHEET, lambda _: xml)
+    override = b'<Override PartName="/xl/sharedStrings.xml" ContentType="%s"/></Types>' % TEXTS
+    patched(path, "[Content_Types].xml", lambda xml: xml.replace(b"</Types>", override))
     with zipfile.ZipFile(path, "a") as archive:
         archive.writestr("xl/sharedStrings.xml", texts)
     trial = read_trial(path)
@@ -209,7 +214,7 @@ def test_a_workbook_that_hurts_is_refused_before_the_memory_is_taken(tmp_path, m
     assert "has no header: row 1048576" in refused(path)
     for body in (b'<row r="9999999"/>', b'<row><c r="ZZZZ1"/></row>', b'<row r="x"/>'):
         sheet(body)
-        assert "is not a readable XLSX file" in refused(path)
+        assert "a.xlsx cannot be read: damaged" in refused(path)
     sheet(b'<row><c r="A1"><v>1</v></c><c r="ALL1"><v>1</v></c></row>' * 500)
     monkeypatch.setenv("PMA_GYM_MAX_CELLS", "100000")
     assert "limit of 100000 cells a table" in refused(path)
@@ -220,9 +225,12 @@ def test_a_workbook_that_hurts_is_refused_before_the_memory_is_taken(tmp_path, m
     sheet(b" " * 2**25)
     assert "limit of 100 MiB unpacked for each MiB of a workbook" in refused(path)
     book(path)
-    entity = b'<!DOCTYPE x [<!ENTITY a "aaaaaaaaaa"><!ENTITY b "&a;&a;&a;">]>'
+    names = [b"e%d" % i for i in range(16)]
+    entities = [b'<!ENTITY %s "%s">' % (b, b"&%s;" % a * 10) for a, b in pairwise(names)]
+    entity = b'<!DOCTYPE x [<!ENTITY e0 "aaaaaaaaaa">' + b"".join(entities) + b"]>"
+    sheet(b'<row><c t="inlineStr"><is><t>&e15;</t></is></c></row>')
     patched(path, SHEET, lambda xml: entity + xml)
-    assert "declares a document type, which no workbook does" in refused(path)
+    assert "a.xlsx cannot be read" in refused(path)
 
 
 def test_a_bare_array_of_many_rows_is_read(tmp_path):

@@ -7,17 +7,13 @@ from typing import Any
 import numpy as np
 
 from pma_gym.data.readers.libraries import needed
-from pma_gym.data.readers.parquet.pages import DELTA_BYTE_ARRAY, read_pages
-from pma_gym.data.readers.table import PROVENANCE, Cells, Request, Table, UnreadableError
-from pma_gym.data.trial_columns import TrialError
-from pma_gym.limits import LimitError, check_limit, limit
+from pma_gym.data.readers.table import PROVENANCE, Cells, Request, Table
+from pma_gym.limits import check_limit
 
 _SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
-_LARGEST_LIST, _LARGEST_TEXT = 100_000, 1 << 22
-"""Of the file's own description: entries of a list, bytes of a text."""
 
 
-def read_parquet(content: bytes, file: str, request: Request = Request()) -> list[Table]:  # noqa: B008
+def read(content: bytes, file: str, request: Request) -> list[Table]:
     """The table in a Parquet file; its first record counts as row 1.
 
     Texts are read in columns with a known name alone, for a text of megabytes may stand once in the
@@ -30,47 +26,27 @@ def read_parquet(content: bytes, file: str, request: Request = Request()) -> lis
     Returns:
         One table.
     Raises:
-        TrialError: pyarrow is missing or cannot read it, or it is beyond a limit.
+        TrialError: pyarrow is missing.
+        LimitError: beyond a limit.
     """
-    for library in ("pyarrow", "pyarrow.parquet"):
-        needed(library, file)
-    try:
-        return [_table(content, file, request)]
-    except (TrialError, LimitError):
-        raise
-    # pyarrow raises its own errors, and OSError, ValueError, UnicodeError... for damaged files.
-    except Exception as error:
-        said = str(error).partition("\n")[0][:200]
-        raise UnreadableError(f"{file} is not a readable Parquet file: {said}") from None
-
-
-def _table(content: bytes, file: str, request: Request) -> Table:
-    parquet = needed("pyarrow.parquet", file)
-    source = parquet.ParquetFile(
-        io.BytesIO(content),
-        thrift_container_size_limit=_LARGEST_LIST,
-        thrift_string_size_limit=_LARGEST_TEXT,
-    )
-    meta = source.metadata
+    needed("pyarrow", file)
+    source = needed("pyarrow.parquet", file).ParquetFile(io.BytesIO(content))
+    meta, schema = source.metadata, source.schema_arrow
     check_limit(file, "columns", meta.num_columns)
     check_limit(file, "rows", meta.num_rows)
     check_limit(file, "cells", meta.num_rows * meta.num_columns)
-    schema = source.schema_arrow
     leaves = [meta.schema.column(i).path for i in range(meta.num_columns)]
-    kinds = {name: _kind(schema.field(i).type) for i, name in enumerate(schema.names)}
-    taken = [
-        name
-        for name in dict.fromkeys(schema.names)
-        if name in leaves and (kinds[name] != "text" or request.is_known(name)) and kinds[name]
-    ]
-    _check_pages(content, file, {leaves.index(name): kinds[name] for name in taken})
-    texts = [name for name in taken if kinds[name] == "text"]
-    source = parquet.ParquetFile(
-        io.BytesIO(content),
-        read_dictionary=texts,
-        thrift_container_size_limit=_LARGEST_LIST,
-        thrift_string_size_limit=_LARGEST_TEXT,
+    kinds = {
+        name: _kind(schema.field(i).type) if name in leaves else ""
+        for i, name in enumerate(schema.names)
+    }
+    taken = [n for n, kind in kinds.items() if kind and (kind != "text" or request.is_known(n))]
+    unpacked = sum(
+        meta.row_group(group).column(leaves.index(name)).total_uncompressed_size
+        for group in range(meta.num_row_groups)
+        for name in taken
     )
+    check_limit(file, "table_mib", unpacked / 2**20)
     table = source.read(columns=taken, use_threads=False)
     rows = table.num_rows if taken else 0
     cells = [
@@ -82,36 +58,26 @@ def _table(content: bytes, file: str, request: Request) -> Table:
     notes, said = _notes(schema.metadata or {}, file)
     dated = [n for n in taken if kinds[n] == "date" and request.is_time(n)]
     said += [f"{name} holds dates, converted to seconds from the first row" for name in dated]
-    return Table(file, schema.names, cells, range(1, rows + 1), notes, remarks=tuple(said))
+    said += [
+        f"{name!r} is passed over: its cells are of type {str(schema.field(i).type)[:60]}"
+        for i, name in enumerate(schema.names)
+        if not kinds[name]
+    ]
+    return [Table(file, schema.names, cells, range(1, rows + 1), notes, remarks=tuple(said))]
 
 
 def _kind(type_: Any) -> str:  # noqa: ANN401
     """Kind of a column's content: "number", "flag", "date", "text"; empty for anything else."""
     types = needed("pyarrow.types", "")
     if types.is_dictionary(type_):
-        type_ = type_.value_type
-        return "text" if types.is_string(type_) or types.is_large_string(type_) else ""
+        return "text" if _kind(type_.value_type) == "text" else ""
     if types.is_integer(type_) or types.is_floating(type_) or types.is_decimal(type_):
         return "number"
     if types.is_timestamp(type_) or types.is_duration(type_) or types.is_time(type_):
         return "date"
     if types.is_boolean(type_):
         return "flag"
-    text = types.is_string(type_) or types.is_large_string(type_)
-    return "text" if text else ""
-
-
-def _check_pages(content: bytes, file: str, kinds: dict[int, str]) -> None:
-    """Refuse pages that unpack beyond the limit; what the file's end declares is not trusted."""
-    unpacked = 0
-    for index, page in read_pages(content):
-        unpacked += page.unpacked if index in kinds else 0
-        check_limit(file, "table_mib", unpacked / 2**20)
-        if kinds.get(index) == "text" and page.encoding == DELTA_BYTE_ARRAY:
-            raise UnreadableError(
-                f"column {index + 1} of {file} holds texts that refer to each other; write "
-                "numbers, or texts with another encoding"
-            )
+    return "text" if types.is_string(type_) or types.is_large_string(type_) else ""
 
 
 def _cells(column: Any, kind: str, is_time: bool, file: str) -> Cells:  # noqa: ANN401
@@ -123,19 +89,12 @@ def _cells(column: Any, kind: str, is_time: bool, file: str) -> Cells:  # noqa: 
         return column.to_pylist()
     if kind == "date":
         return _dates(column, is_time, file)
-    column = column.combine_chunks()
-    if not pyarrow.types.is_dictionary(column.type):
-        column = column.dictionary_encode()
-    chunks = column.chunks if isinstance(column, pyarrow.ChunkedArray) else [column]
-    out: list[object] = []
-    for chunk in chunks:
-        words = chunk.dictionary.cast(pyarrow.large_binary()).to_pylist()
-        most = limit("cell_characters")
-        texts = [None if w is None else w[: most + 1].decode("utf-8", "replace") for w in words]
-        for text in texts:
-            check_limit(f"a cell of {file}", "cell_characters", len(text or ""))
-        out += [None if i is None else texts[i] for i in chunk.indices.to_pylist()]
-    return out
+    cells: list[object] = []
+    # Bytes first: not every text is one.
+    for word in column.cast(pyarrow.string()).cast(pyarrow.large_binary()).to_pylist():
+        check_limit(f"a cell of {file}", "cell_characters", len(word or b""))
+        cells.append(None if word is None else word.decode("utf-8", "replace"))
+    return cells
 
 
 def _dates(column: Any, is_time: bool, file: str) -> Cells:  # noqa: ANN401

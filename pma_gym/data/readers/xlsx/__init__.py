@@ -1,1 +1,0 @@
-"""XLSX workbooks as tables, read as a stream."""
