@@ -140,14 +140,14 @@ def _named(
             f"{path.name} has no measurement: name at least one column contraction_mm, "
             f"rotation_deg, load_n or pressure_kpa, or map it in [columns] of {DESCRIPTION}{hint}"
         )
-    check_signals(path, trial, description.columns, description.form)
+    check_signals(table, trial, description.columns)
     words = [strange if each.startswith(_UNKNOWN) else each for each in words]
     doubts += [
         (path.name, each)
         for each in (
             *words,
             *held_commands(trial, description.form.interpolation == "zoh"),
-            *empty_runs(path, trial, table),
+            *empty_runs(trial, table),
             *_outliers(trial, table),
         )
     ]
