@@ -8,7 +8,9 @@ import pytest
 
 from pma_gym.data.datasets.dataset import read_dataset
 from pma_gym.data.datasets.lab_sensors import LabSensor
+from pma_gym.data.files.sparse_commands import joined
 from pma_gym.data.files.trial_files import TrialWarning, write_trial
+from pma_gym.data.quality.gaps import gaps
 from pma_gym.data.trial import Trial, TrialError
 
 ROWS = 60
@@ -354,3 +356,35 @@ def test_what_a_lab_states_of_its_sensors_is_read(folder):
     assert dataset.sensors == {"load": LabSensor(0.5, 1.5, (0.0, 50.0))}
     load = np.concatenate([each.trial.measurements["load"] for each in dataset.trials])
     assert np.isnan(load).any() and np.nanmax(load) < 50.0
+
+
+@pytest.mark.parametrize("every", [2, 12])
+def test_a_slower_writers_commands_are_held_or_joined_as_one_key_says(folder, every):
+    volts = 4.0 + 3.0 * np.sin(3.0 * NORMAL["time_s"])
+    kept = np.arange(volts.size) % every == 0
+    write(folder / "a.csv", motor_voltage_v=np.where(kept, volts, np.nan))
+    line = 'if it goes to its next value in a line, write interpolation = "foh" under .format.'
+    with pytest.warns(TrialWarning, match=f"held at the value before; {line}"):
+        trial = read_dataset(folder).trials[0].trial
+    (folder / "dataset.toml").write_text('[format]\ninterpolation = "zoh"')
+    with pytest.warns(TrialWarning, match='held at the value before, as interpolation = "zoh"'):
+        held = read_dataset(folder).trials[0].trial
+    for each in (trial, held):
+        np.testing.assert_array_equal(np.isfinite(each.commands["motor_voltage"]), kept)
+    assert gaps(held) == []
+    (folder / "dataset.toml").write_text('[format]\ninterpolation = "foh"')
+    with pytest.warns(TrialWarning, match='are joined linearly, as interpolation = "foh"'):
+        trial = read_dataset(folder).trials[0].trial
+    last = np.flatnonzero(kept)[-1]
+    between = np.interp(NORMAL["time_s"], NORMAL["time_s"][kept], volts[kept])
+    np.testing.assert_allclose(trial.commands["motor_voltage"][:last], between[:last])
+
+
+@pytest.mark.parametrize("form", ["zoh", "foh"])
+def test_a_gap_of_a_slower_writer_is_neither_held_nor_joined(form):
+    time = np.arange(2000) * 0.01
+    volts = np.where(np.arange(2000) % 12 == 0, 4.0 + np.sin(time), np.nan)
+    volts[600:800] = np.nan
+    volts = joined(volts, time) if form == "foh" else volts
+    (gap,) = gaps(Trial(time, {"motor_voltage": volts}))
+    assert (gap.last, gap.first) == (588, 804)

@@ -10,6 +10,7 @@ from pma_gym.data.datasets.dataset_checks import check_signals, empty_runs
 from pma_gym.data.datasets.dataset_files import PROPOSED, list_files, read_files
 from pma_gym.data.datasets.dataset_toml import DESCRIPTION, Description, read_description
 from pma_gym.data.datasets.lab_sensors import LabSensor, without_ends
+from pma_gym.data.files.sparse_commands import held_commands
 from pma_gym.data.files.trial_files import TrialWarning, trial_of
 from pma_gym.data.files.trial_hints import strange_columns
 from pma_gym.data.quality.outliers import outliers
@@ -139,11 +140,16 @@ def _named(
             f"{path.name} has no measurement: name at least one column contraction_mm, "
             f"rotation_deg, load_n or pressure_kpa, or map it in [columns] of {DESCRIPTION}{hint}"
         )
-    check_signals(path, trial, description.columns, description.form)
+    check_signals(table, trial, description.columns)
     words = [strange if each.startswith(_UNKNOWN) else each for each in words]
     doubts += [
         (path.name, each)
-        for each in (*words, *empty_runs(path, trial, table), *_outliers(trial, table))
+        for each in (
+            *words,
+            *held_commands(trial, description.form.interpolation == "zoh"),
+            *empty_runs(trial, table),
+            *_outliers(trial, table),
+        )
     ]
     trial = without_ends(
         trial, description.sensors, lambda words: doubts.append((path.name, words))

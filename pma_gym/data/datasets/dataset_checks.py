@@ -2,16 +2,13 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import partial
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pma_gym.data.files.trial_files import place_in_file, read_header
 from pma_gym.data.files.trial_hints import mapping_line
 from pma_gym.data.quality.outliers import check_possible
-from pma_gym.data.readers.table import FileFormat, Table
+from pma_gym.data.readers.table import Table
 from pma_gym.data.signals import SIGNALS
 from pma_gym.data.trial import Trial
 from pma_gym.data.trial_columns import BY_QUANTITY, ColumnMap, TrialError
@@ -54,16 +51,13 @@ class _Slip:
     extra: str = ""
 
 
-def check_signals(
-    path: Path, trial: Trial, columns: ColumnMap, form: FileFormat | None = None
-) -> None:
+def check_signals(table: Table, trial: Trial, columns: ColumnMap) -> None:
     """Refuse a trial whose values cannot be in the columns' units, or with a dead sensor.
 
     Args:
-        path: its file.
+        table: of its file.
         trial: what was read.
         columns: the lab's names to ours.
-        form: what the lab says about its files.
     Raises:
         TrialError: names file, column, row, rule and mend.
     """
@@ -75,17 +69,16 @@ def check_signals(
     for find in (_contraction, _pressure, _load, _rotation):
         slip = find(file_key)
         if slip:
-            raise TrialError(_slip_text(path, slip, file_key[slip.quantity], columns, form))
-    place = partial(place_in_file, path, columns=columns, form=form)
+            raise TrialError(_slip_text(table, slip, file_key[slip.quantity], columns))
     for quantity in ("contraction", "pressure", "pressure_command"):
         # A slide without a muscle goes as far as it likes.
         if not SIGNALS[quantity].shortens or any(name in file_key for name in _MUSCLE):
-            check_possible(file_key, quantity, place)
+            check_possible(file_key, quantity, table.place)
     for quantity in trial.measurements:
-        _check_alive(path, quantity, file_key)
+        _check_alive(table.file, quantity, file_key)
 
 
-def empty_runs(path: Path, trial: Trial, table: Table | None = None) -> Iterator[str]:
+def empty_runs(trial: Trial, table: Table) -> Iterator[str]:
     """Return a message on measurements that are empty in over half of a trial's rows."""
     for quantity, values in trial.measurements.items():
         empty = np.isnan(values)
@@ -98,12 +91,10 @@ def empty_runs(path: Path, trial: Trial, table: Table | None = None) -> Iterator
         edges = np.flatnonzero(np.diff(np.r_[0, empty, 0]))
         starts, ends = edges[::2], edges[1::2]
         longest = int(np.argmax(ends - starts))
-        place = table.place if table else partial(place_in_file, path)
-        first = place(int(starts[longest])).partition(" of ")[0]
-        last = place(int(ends[longest] - 1)).partition(" of ")[0]
+        first, last = table.rows[int(starts[longest])], table.rows[int(ends[longest] - 1)]
         yield (
-            f"{name} is empty in {empty.sum()} of {empty.size} rows, the longest gap from {first} "
-            f"to {last}; there it counts as not measured"
+            f"{name} is empty in {empty.sum()} of {empty.size} rows, the longest gap from row "
+            f"{first} to row {last}; there it counts as not measured"
         )
 
 
@@ -218,7 +209,7 @@ def _rotation(file_key: dict[str, Array]) -> _Slip | None:
     return None
 
 
-def _check_alive(path: Path, quantity: str, file_key: dict[str, Array]) -> None:
+def _check_alive(file: str, quantity: str, file_key: dict[str, Array]) -> None:
     """Refuse a measurement that never changes although what drives it does."""
     values = file_key[quantity][np.isfinite(file_key[quantity])]
     command = _moved(file_key, quantity)
@@ -226,7 +217,7 @@ def _check_alive(path: Path, quantity: str, file_key: dict[str, Array]) -> None:
         return
     name = BY_QUANTITY[quantity].name
     raise TrialError(
-        f"{name} of {path.name} is {values[0]:g} in all {values.size} readings although "
+        f"{name} of {file} is {values[0]:g} in all {values.size} readings although "
         f"{_change(file_key, command)}; if the sensor was not connected, remove the column"
     )
 
@@ -238,18 +229,16 @@ def _change(file_key: dict[str, Array], command: str) -> str:
     return f"{column.name} goes from {low:.4g} to {high:.4g} {column.unit}"
 
 
-def _slip_text(
-    path: Path, slip: _Slip, values: Array, columns: ColumnMap, form: FileFormat | None
-) -> str:
+def _slip_text(table: Table, slip: _Slip, values: Array, columns: ColumnMap) -> str:
     """The message on a column in another unit."""
     column = BY_QUANTITY[slip.quantity]
-    place = place_in_file(path, int(np.nanargmax(np.abs(values))), columns, form)
+    place = table.place(int(np.nanargmax(np.abs(values))))
     said = f"{column.name} {slip.seen} ({place}); it looks like {slip.unit}"
     if slip.extra:
         said += f", {slip.extra}"
     if not slip.factor:
         return f"{said}: give [columns] of dataset.toml a factor"
-    for name in read_header(path, columns, form):
+    for name in table.header:
         entry = columns.get(name)
         if (entry.get("name", name) if isinstance(entry, dict) else entry) == column.name:
             return f"{said}: multiply factor and offset of {name!r} in [columns] by {slip.factor:g}"

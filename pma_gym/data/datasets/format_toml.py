@@ -7,7 +7,7 @@ from pma_gym.data.readers.table import FileFormat, shown
 from pma_gym.data.trial_columns import TrialError, suggestion
 
 _SEPARATORS = {",": ",", ";": ";", "\t": "\t", "|": "|", " ": " ", "tab": "\t", "blanks": " "}
-_KEYS = ("separator", "decimal", "encoding", "header_row", "names", "missing")
+_KEYS = ("separator", "decimal", "encoding", "header_row", "names", "missing", "interpolation")
 
 
 def file_format(table: Mapping[str, object]) -> FileFormat:
@@ -16,7 +16,8 @@ def file_format(table: Mapping[str, object]) -> FileFormat:
     Args:
         table: `separator` (",", ";", "|", "tab" or "blanks"), `decimal` ("." or ","), `encoding`,
             `header_row` (number of the row with the columns' names), `names` (of the columns, where
-            no row has them), `missing` (numbers that stand for "not measured").
+            no row has them), `missing` (numbers that stand for "not measured"), `interpolation` (of
+            commands over empty cells, "foh" or "zoh").
     Raises:
         TrialError: an unknown key or a value of another kind; the message names both and the rule.
     """
@@ -39,6 +40,7 @@ def file_format(table: Mapping[str, object]) -> FileFormat:
         header_row=_header_row(table.get("header_row")),
         names=_names(table.get("names")),
         missing=_missing(table.get("missing")),
+        interpolation=_choice(table, "interpolation", ("foh", "zoh")),
     )
 
 

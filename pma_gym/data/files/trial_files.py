@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pma_gym.data.files.even_clock import even_clock
+from pma_gym.data.files.sparse_commands import joined
 from pma_gym.data.files.trial_formats import ENCODERS
 from pma_gym.data.files.trial_hints import looks_like, mapping_line
 from pma_gym.data.files.trial_loading import load_table
@@ -108,6 +109,8 @@ def trial_of(table: Table, mapping: ColumnMap, form: FileFormat) -> Trial:
     check_time(arrays["time"], table.place)
     _doubt_time(arrays["time"], table)
     check_commanded(arrays, table.file)
+    if form.interpolation == "foh":
+        _join_commands(known, arrays, table)
     inside = {
         source.column.quantity: source.column.to_si(arrays[source.column.quantity])
         for source in known
@@ -224,6 +227,21 @@ def _match(table: Table, mapping: ColumnMap) -> list[Source]:
     if absent:
         warn(f"{table.file} lacks columns that [columns] maps: {', '.join(absent)}")
     return matched
+
+
+def _join_commands(
+    known: list[Source], arrays: dict[str, NDArray[np.float64]], table: Table
+) -> None:
+    """Fill the empty cells of commands by lines, with a warning."""
+    for source in known:
+        values = arrays[source.column.quantity]
+        if source.column.kind == "command" and np.isnan(values).any():
+            arrays[source.column.quantity] = filled = joined(values, arrays["time"])
+            warn(
+                f"{table.file}: {source.name} is empty in {np.isnan(values).sum()} of "
+                f"{values.size} rows, {np.sum(np.isnan(values) & ~np.isnan(filled))} of them are "
+                'joined linearly, as interpolation = "foh" under [format] says'
+            )
 
 
 def _time_hint(names: Iterable[str]) -> str:

@@ -16,9 +16,8 @@ from pma_gym.data.readers.units import unit_factor
 from pma_gym.data.trial_checks import check_values
 from pma_gym.data.trial_columns import ColumnMap, Source, TrialError
 
-_FAR_BEYOND, _LITTLE_BEYOND = 10.0, 2.0
-"""Times a column's limit: whole numbers beyond the first are counts; a command up to the second is
-in its unit."""
+_FAR_BEYOND = 9.0
+"""Times a column's limit from which values are in another unit: per cent reach nearly ten times."""
 
 
 class TrialWarning(UserWarning):
@@ -172,7 +171,7 @@ def _beyond_fix(source: Source, theirs: NDArray[np.float64], values: NDArray[np.
         return f"the log looks like raw DAQ counts: {factor}"
     if column.kind != "command":
         return f"if the log is in another unit, {factor}; else correct the reading"
-    if reach <= _LITTLE_BEYOND or np.mean((values >= low) & (values <= high)) >= 0.5:
+    if reach <= _FAR_BEYOND or np.mean((values >= low) & (values <= high)) >= 0.5:
         return f"if it is a controller's output before its saturation, {clip}"
     return f"if it is a controller's output, {clip}; if it is in another unit, {factor}"
 

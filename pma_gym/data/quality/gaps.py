@@ -21,6 +21,9 @@ LONGEST_S = 0.2
 TIMES = 5.0
 """How many times as long as the usual step a gap is at least."""
 
+REGULAR = 0.9
+"""Share of a command's values, equally many rows apart, from which a slower writer gives it."""
+
 LEAST_S, LEAST_ROWS = 0.5, 20
 """Shortest piece that is kept (s), and its fewest rows."""
 
@@ -81,10 +84,13 @@ def gaps(trial: Trial) -> list[Gap]:
 
 
 def _without_command(name: str, values: Array, time: Array, limit: float) -> Iterator[Gap]:
-    """Where a command that most rows give is not given for long, and changes meanwhile."""
+    """Where a command that rows give regularly is not given for long, and changes meanwhile."""
     given = np.flatnonzero(np.isfinite(values))
-    if 2 * given.size <= values.size:
+    apart = np.diff(given)
+    usual = np.median(apart) if apart.size else 0.0
+    if 2 * given.size <= values.size and np.mean(apart == usual) < REGULAR:
         return
+    limit = max(limit, TIMES * float(np.median(np.diff(time[given]))))
     span = float(np.ptp(values[given]))
     for last, first in zip(given, given[1:], strict=False):
         if first - last < 2 or time[first] - time[last] <= limit:

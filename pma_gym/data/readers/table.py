@@ -64,6 +64,8 @@ class FileFormat:
         header_row: number of the row with the columns' names; None: the one that fits.
         names: names of the columns, where the files have no row with them; empty if they have one.
         missing: numbers that stand for "not measured", in the file's units.
+        interpolation: of commands over empty cells: "zoh" (held) or "foh" (joined linearly); None:
+            held.
     """
 
     separator: str | None = None
@@ -72,6 +74,7 @@ class FileFormat:
     header_row: int | None = None
     names: tuple[str, ...] = ()
     missing: tuple[float, ...] = ()
+    interpolation: str | None = None
 
 
 @dataclass(frozen=True)
