@@ -4,7 +4,7 @@ import math
 from pathlib import Path
 
 from controllers.controller import Reference
-from controllers.design.designs import loop_name, task_kind
+from controllers.design.designs import loop_name, task_kind, warn_of_other_plant
 from controllers.policies.adapter import PolicyAdapter
 from controllers.policies.document import PolicyError
 from controllers.policies.network import Network
@@ -53,6 +53,9 @@ class Policy:
                 "the environment what it was trained for, or take a policy of this task and loop; "
                 "at another rate or delay it runs as Policy(path, anywhere=True)"
             )
+        made_for = str(self.file.environment["kwargs"].get("model", "station"))
+        fix = "train one on it: python -m benchmarks train"
+        warn_of_other_plant(station, f"the weights of policy {self.name}", made_for, fix)
         self._adapter.reset(reference, station)
 
     def act(self, measurement: Measurement, time: float) -> float:

@@ -81,7 +81,7 @@ FAST = {
         *("--controller", "serres_feedforward", "--task", "displacement"),
         *("--pressure", "300", "--out", "v.csv"),
     ],
-    "tune": ["--out", "gains.json"],
+    "tune": ["--out", "gains.toml"],
 }
 """Arguments of every command with --model."""
 

@@ -29,6 +29,9 @@ from pma_gym.tasks import (
     named_task,
     phase_errors,
     phase_rmse,
+    sine,
+    speeds,
+    steps,
 )
 from pma_gym.units import SI_FACTORS
 
@@ -155,6 +158,16 @@ def test_obstacles_say_what_is_lacking():
         infeasibility_reason(TASKS["displacement"], "cascade", 300e3)
 
 
+def test_a_contraction_is_followed_by_the_regulator_under_a_load():
+    task = sine("contraction")
+    assert (task.actuator, task.load, task.starts) == ("regulator", 200.0, (150e3, 350e3))
+    assert (task.name, task.schedule.span) == ("contraction_sine_2.5mm_0.4hz", 12.5e-3)
+    assert infeasibility_reason(task, "station", 300e3) is None
+    assert following("a", "contraction", _far, load=90.0).load == 90.0
+    for make in (multisine, speeds, steps):
+        assert make("contraction", 3).schedule.quantity == "contraction"
+
+
 def _far(time):
     return 15e-3 * time
 
@@ -163,8 +176,12 @@ def _far(time):
     ("make", "words"),
     [
         (
-            lambda: following("a", "contraction", _far),
-            "quantity must be one of extension, rotation",
+            lambda: following("a", "load", _far),
+            "quantity must be one of extension, rotation, contraction, got 'load'",
+        ),
+        (
+            lambda: following("a", "extension", _far, load=100.0),
+            "load must be.*0 where the motor moves, got 100",
         ),
         (lambda: following("a", "extension", np.cos), "must begin at 0.*got 1.*ramp it in"),
         (lambda: following("a", "extension", lambda t: t / (4.0 - t)), "finite"),

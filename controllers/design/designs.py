@@ -2,13 +2,16 @@
 
 import math
 import re
+import warnings
 from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
 from pma_gym.documents import read_toml
+from pma_gym.effects.cable.hanging_load import GRAVITY
 from pma_gym.envs import StationInfo
+from pma_gym.plant.model import Model, load_model, shipped_models
 from pma_gym.tasks import Task
 
 DESIGNS_FILE = Path(__file__).with_name("designs.toml")
@@ -21,6 +24,10 @@ KINDS = {"extension": "displacement", "rotation": "rotation", "contraction": "co
 
 EXERCISE_KINDS = ("isokinetic", "moment")
 """Kinds of exercises: of a speed that is prescribed, and of a moment."""
+
+OTHER_PLANT = 2.0
+"""Ratio of accelerations by volt beyond which a plant counts as another one: half the factor by
+which a usual gain margin of 12 dB lets a loop's gain grow (assumption)."""
 
 Settings = TypeVar("Settings", bound=NamedTuple)
 
@@ -54,6 +61,8 @@ def designed(
     known = [name for name, kinds in loops.items() if kind in kinds]
     if not known:
         return defaults[kind]
+    fix = f"give {controller} settings of its own"
+    warn_of_other_plant(station, f"the settings of {controller}", station.model.plant, fix)
     table = loops[nearest_loop(loop_name(station), known)][kind]
     values = {name: value for name, value in table.items() if name != "provenance"}
     strange = [name for name in values if name not in defaults[kind]._fields]
@@ -63,6 +72,40 @@ def designed(
             f"{', '.join(defaults[kind]._fields)}; write it anew: python -m benchmarks design"
         )
     return defaults[kind]._replace(**values)
+
+
+def warn_of_other_plant(station: StationInfo, what: str, name: str, fix: str) -> None:
+    """Warn where settings were made for a plant that moves otherwise: the loop may oscillate.
+
+    Args:
+        station: its model and task.
+        what: the settings, for the message.
+        name: name of the model that they were made for.
+        fix: what to do, for the message.
+    """
+    ours = _acceleration(station.model, station.task)
+    theirs = _acceleration(_shipped(name), station.task) if name in shipped_models() else None
+    if ours and theirs and not 1.0 / OTHER_PLANT <= ours / theirs <= OTHER_PLANT:
+        warnings.warn(
+            f"{what} were made for model {name}; a volt of the {station.task.actuator} accelerates "
+            f"model {station.model.name} {ours / theirs:.2g} times as much in task "
+            f"{station.task.name}, so that the loop may oscillate or be slow; {fix}",
+            stacklevel=3,
+        )
+
+
+_shipped = cache(load_model)
+
+
+def _acceleration(model: Model, task: Task) -> float | None:
+    """Signal of the task's actuator by volt and moving mass; None without a balance of forces."""
+    if not model.rig.balances_loads:
+        return None
+    known = model.parameters
+    rotor, hanging = known["rotor"], known.get("hanging_load")
+    mass = known["slide"].mass + rotor.inertia / rotor.radius**2
+    mass += hanging.share * task.load / GRAVITY if hanging else 0.0
+    return known["drive" if task.actuator == "motor" else "regulator_line"].gain / mass
 
 
 def task_kind(station: StationInfo) -> str:

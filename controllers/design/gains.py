@@ -12,6 +12,7 @@ from controllers.design.designs import (
     must_give_a_position,
     nearest_loop,
     task_kind,
+    warn_of_other_plant,
 )
 from pma_gym.data.signals import SIGNALS
 from pma_gym.envs import StationInfo
@@ -117,6 +118,10 @@ def scheduled_gains(controller: str, station: StationInfo, path: Path = GAINS_FI
             f"{path.name} has no gains of {controller} for the {task.name} task on a "
             f"{model.plant}; tune them: python -m benchmarks tune --model {name}"
         )
+    file = f"python -m benchmarks tune --model {model.name}.toml --out gains.toml"
+    mine = f'scheduled_gains("{controller}", env.station, Path("gains.toml"))'
+    fix = f"tune it: {file}, and give the controller {mine} of controllers.design.gains"
+    warn_of_other_plant(station, f"the gains of {controller}", name, fix)
     table = loops[nearest_loop(loop_name(station), known)][kind][controller]
     columns = column_names(_unit(task.schedule.quantity))
     pressures = np.array(table["pressure_kpa"]) * 1e3

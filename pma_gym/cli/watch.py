@@ -7,6 +7,7 @@ from typing import Annotated
 
 import numpy as np
 import typer
+from gymnasium.error import DependencyNotInstalled
 
 from pma_gym.cli.completion import NamedModel, task_names
 from pma_gym.cli.controller_source import controller_of
@@ -48,13 +49,11 @@ def watch(
     """Watch a trial in a window at real time, or write it as a film."""
     if video is not None:
         _check_film(video)
-    env = PMAEnv(
-        task,
-        "human" if video is None else "rgb_array",
-        width,
-        model=model,
-        pressure_kpa=pressure,
-    )
+    mode = "human" if video is None else "rgb_array"
+    try:
+        env = PMAEnv(task, mode, width, model=model, pressure_kpa=pressure)
+    except DependencyNotInstalled as error:
+        raise OutputError(str(error)) from error
     chosen = _voltages(controller, env)
     env.reset(seed=seed)
     frames = _run(env, chosen(env), filmed=video is not None)

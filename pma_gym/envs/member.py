@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from pma_gym.engine.actions import CommandLine
 from pma_gym.engine.engine import Engine
 from pma_gym.engine.observation import ObservationTable
-from pma_gym.engine.option_checks import check_known
+from pma_gym.engine.option_checks import Pressure, check_known
 from pma_gym.engine.options import Options
 from pma_gym.envs.episode import NOT_BEGUN
 from pma_gym.envs.pma_env import RESET_OPTIONS, PMAEnv
@@ -94,6 +94,11 @@ class BatchMember(PMAEnv):
         }
         self.__dict__.update(values)
         self._find_offsets()
+
+    @property
+    def pressure_kpa(self) -> Pressure:
+        """The option `pressure_kpa` of the later episodes."""
+        return self._engine.wanted[self._index]
 
     @property
     def index(self) -> int:
@@ -224,5 +229,6 @@ def refusal(name: str) -> str:
     """Message on an attribute of a batch's environment that cannot be set, with the fix."""
     return (
         f"attribute {name!r} cannot be set: {TOGETHER}, and have no attributes of their own; give "
-        "options when the environments are made, and pressure_kpa by set_options() before reset()"
+        "options, a task or a load when the environments are made, and pressure_kpa by set_attr() "
+        "of the VecEnv for all later episodes or by set_options() for the next reset()"
     )

@@ -397,6 +397,12 @@ class PMAVectorEnv(
         """Gauge pressure at the start of every episode (Pa), shape (num_envs,)."""
         return self.engine.pressures.copy()
 
+    def set_pressures(self, wanted: Mapping[int, Pressure]) -> None:
+        """Begin later episodes at other pressures (kPa), by the index of the environment."""
+        self.engine.set_pressures(wanted)
+        # States are of environments with the same pressures.
+        self._setup_of = None, ()
+
     def member(self, index: int) -> BatchMember:
         """Return a read-only view of one environment, with the attributes of a `PMAEnv`.
 

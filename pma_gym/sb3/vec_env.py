@@ -13,7 +13,7 @@ from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.vec_env import VecEnv
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices, VecEnvObs, VecEnvStepReturn
 
-from pma_gym.engine.option_checks import check_known
+from pma_gym.engine.option_checks import check_known, parse_pressure
 from pma_gym.envs.member import TOGETHER, BatchMember, refusal
 from pma_gym.envs.registered import is_id, registered
 from pma_gym.envs.summary import last_info
@@ -63,12 +63,16 @@ class EngineVecEnv(VecEnv):
         value: Any,  # noqa: ANN401 - as the base class has it
         indices: VecEnvIndices = None,
     ) -> None:
-        """Refuse: environments that share an engine have no separate attributes.
+        """Set `pressure_kpa` of the later episodes; environments that share an engine have no more.
 
         Raises:
-            AttributeError: always; says what can be done instead.
+            AttributeError: another attribute; says what can be done instead.
+            ValueError: a pressure out of range, as of the option.
         """
-        raise AttributeError(refusal(attr_name))
+        if attr_name != "pressure_kpa":
+            raise AttributeError(refusal(attr_name))
+        pressure = parse_pressure(value, self.envs.engine.nominal_model)
+        self.envs.set_pressures({one.index: pressure for one in self._members(indices)})
 
     def env_method(
         self,

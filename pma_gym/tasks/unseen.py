@@ -1,7 +1,8 @@
-"""Unseen references: sines, sums of sines, steps and random speeds, for extension and rotation.
+"""Unseen references: sines, sums of sines, steps and random speeds.
 
-The motor follows them at the pressures of the dissertation's trials. They last 10 s, lie within
-the dissertation's ranges (25 mm, 90 deg) and begin at 0, and an error is given in percent of that
+The motor follows those of extension and rotation at the pressures of the dissertation's trials, the
+regulator those of contraction under a load. They last 10 s, lie within the ranges of the tasks
+(25 mm, 90 deg, 12.5 mm of contraction) and begin at 0, and an error is given in percent of that
 range, so that figures of all of them compare. Sines and their sums are faded in over 2.5 s, without
 a jump of speed. But for the steps, which nothing follows, they are no faster than three times the
 dissertation's own speed, 5 mm/s and 18 deg/s (a sum of sines up to five times while it is faded
@@ -12,9 +13,11 @@ what a station lacks for one.
 
 import re
 from collections.abc import Callable
+from dataclasses import replace
 
 from pma_gym.data import motions
 from pma_gym.data.trial_schedule import Motion, Phase, TrialSchedule
+from pma_gym.tasks.isotonic import isotonic
 from pma_gym.tasks.task import TASKS, Task
 from pma_gym.units import SI_FACTORS
 
@@ -37,25 +40,41 @@ SLOWEST = 0.1
 FREQUENCIES_HZ = tuple(0.1 * k for k in range(1, 9))
 """Of a multisine: the first eight harmonics of the trial's length."""
 
-_BASES = {"extension": "displacement", "rotation": "rotation"}
-"""Name of the dissertation's task by quantity."""
+_BASES = {
+    "extension": TASKS["displacement"],
+    "rotation": TASKS["rotation"],
+    "contraction": isotonic(name="contraction"),
+}
+"""Task by quantity, whose range, pressures and load references have."""
 
 
 def following(
-    name: str, quantity: str, motion: Motion, duration: float = DURATION_S, span: float = 0.0
+    name: str,
+    quantity: str,
+    motion: Motion,
+    duration: float = DURATION_S,
+    span: float = 0.0,
+    load: float | None = None,
 ) -> Task:
-    """A task of the motor whose reference is any function of time, scored as one phase.
+    """A task whose reference is any function of time, scored as one phase.
+
+    The motor follows an extension or a rotation. The regulator follows a contraction, while the
+    motor holds a load; the task begins at 150 to 350 kPa, as `isotonic` does, if
+    `dataclasses.replace(task, start_pressures=(200e3, 300e3))` sets no other pressures (Pa).
 
     Args:
         name: name of the task.
-        quantity: `extension` or `rotation`.
+        quantity: `extension`, `rotation` or `contraction`.
         motion: position (m or rad) by time since the start of the trial (s), of arrays and of
             numbers; 0 at time 0. To be sent to other processes it must be a function of a module
             or an object, no lambda.
         duration: how long (s).
-        span: range that errors are given in percent of (m or rad); the dissertation's if not given.
+        span: range that errors are given in percent of (m or rad); 25 mm, 90 deg or 12.5 mm of
+            contraction if not given.
+        load: load that the motor holds during a contraction (N); 200 N if not given.
     Raises:
-        ValueError: another quantity, a motion that does not begin at 0 or is not finite.
+        ValueError: another quantity, a motion that does not begin at 0 or is not finite, or a load
+            where the motor moves.
 
     Example:
         >>> import numpy as np
@@ -68,7 +87,7 @@ def following(
     phase = Phase("whole", 0.0, duration, float(motion(0.0)), mean, motion)
     own = base.schedule
     schedule = TrialSchedule(name, own.quantity, own.unit, span or own.span, (phase,))
-    return Task(name, schedule, base.lowest_pressure, base.highest_pressure)
+    return replace(base, name=name, schedule=schedule, load=base.load if load is None else load)
 
 
 def sine(
@@ -83,9 +102,9 @@ def sine(
         y = s(t) (mean - amplitude cos(2 pi frequency t)),   s fading in
 
     Args:
-        quantity: `extension` or `rotation`.
-        mean: mean position (m or rad); 0.5 of the range if not given, 12.5 mm or 45 deg.
-        amplitude: amplitude (m or rad); 0.2 of the range if not given, 5 mm or 18 deg.
+        quantity: `extension`, `rotation` or `contraction`.
+        mean: mean position (m or rad); 0.5 of the range if not given, 12.5 mm, 45 deg or 6.25 mm.
+        amplitude: amplitude (m or rad); 0.2 of the range if not given, 5 mm, 18 deg or 2.5 mm.
         frequency: frequency (Hz).
         name: name of the task; made of the numbers if not given.
     """
@@ -94,7 +113,7 @@ def sine(
     amplitude = 0.2 * span if amplitude is None else amplitude
     tones = motions.Tones(mean, (amplitude,), (frequency,), (0.75,))
     width = f"{amplitude / SI_FACTORS[unit]:g}{unit}"
-    name = name or f"{_BASES[quantity]}_sine_{width}_{frequency:g}hz"
+    name = name or f"{_BASES[quantity].name}_sine_{width}_{frequency:g}hz"
     return following(name, quantity, tones.ramped(RISE_S, DURATION_S))
 
 
@@ -131,7 +150,7 @@ def speeds(quantity: str, seed: int = 0, name: str = "") -> Task:
 
 
 def _drawn(kind: str, quantity: str, seed: int, name: str, motion: Motion) -> Task:
-    return following(name or f"{_BASES[quantity]}_{kind}_{seed}", quantity, motion)
+    return following(name or f"{_BASES[quantity].name}_{kind}_{seed}", quantity, motion)
 
 
 def _span(quantity: str) -> tuple[float, str]:
@@ -142,7 +161,7 @@ def _span(quantity: str) -> tuple[float, str]:
 def _base(quantity: str) -> Task:
     if quantity not in _BASES:
         raise ValueError(f"quantity must be one of {', '.join(_BASES)}, got {quantity!r}")
-    return TASKS[_BASES[quantity]]
+    return _BASES[quantity]
 
 
 DRAWN: dict[str, Callable[..., Task]] = {"multisine": multisine, "steps": steps, "speeds": speeds}
@@ -154,10 +173,10 @@ SEEDS = 1_000_000
 
 def _all() -> dict[str, Task]:
     made = {}
-    for quantity, base in _BASES.items():
+    for base in TASKS.values():
         for kind, make in {"sine": sine, **DRAWN}.items():
-            name = f"{base}_{kind}"
-            made[name] = make(quantity, name=name)
+            name = f"{base.name}_{kind}"
+            made[name] = make(base.schedule.quantity, name=name)
     return made
 
 
@@ -174,5 +193,4 @@ def unseen(name: str) -> Task | None:
     match = re.fullmatch(r"(displacement|rotation)_(multisine|steps|speeds)_(0|[1-9]\d*)", name)
     if match is None or int(match[3]) >= SEEDS:
         return None
-    quantity = next(q for q, base in _BASES.items() if base == match[1])
-    return DRAWN[match[2]](quantity, int(match[3]))
+    return DRAWN[match[2]](TASKS[match[1]].schedule.quantity, int(match[3]))

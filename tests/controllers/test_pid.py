@@ -1,6 +1,7 @@
 """The PID against analytic responses, at its limits, and on the station."""
 
 import math
+import warnings
 from dataclasses import replace
 
 import numpy as np
@@ -9,8 +10,9 @@ import pytest
 from controllers import CONTROLLERS, PID, FeedforwardPID
 from controllers.design.gains import Gains, scheduled_gains
 from controllers.models.voltage import nominal_offset
+from pma_gym.envs import PMAEnv
 from pma_gym.plant.model import load_model
-from pma_gym.tasks import EVERY_TASK
+from pma_gym.tasks import EVERY_TASK, isotonic
 
 PERIOD = 0.01
 
@@ -19,6 +21,28 @@ def begun(gains, station, reference=lambda time: 0.0, period=PERIOD):
     controller = PID(gains)
     controller.reset(reference, station(period=period))
     return controller
+
+
+@pytest.mark.parametrize("name", ["pid", "feedforward_pid", "lqg", "adrc", "ppo"])
+def test_settings_of_another_plant_are_said_to_be(name):
+    env = PMAEnv("displacement", pressure_kpa=300)
+    env.reset(seed=1)
+    for model in ("station", "serres2008"):
+        CONTROLLERS[name]().reset(env.reference, replace(env.station, model=load_model(model)))
+    light = load_model("station").replace({"rotor.inertia_kg_m2": 1e-5}, name="light")
+    with pytest.warns(UserWarning, match="model station; a volt of the motor .*light 6.8 times"):
+        CONTROLLERS[name]().reset(env.reference, replace(env.station, model=light))
+
+
+def test_a_heavy_load_that_hangs_is_another_plant_to_the_regulator():
+    hanging = load_model("station").with_effects({"hanging_load": {"share": 1.0}})
+    for load, warned in ((10.0, False), (400.0, True)):
+        env = PMAEnv(isotonic(load), model=hanging, pressure_kpa=300)
+        env.reset(seed=1)
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            PID().reset(env.reference, env.station)
+        assert [str(one.message)[:15] for one in caught] == ["the gains of pi"] * warned
 
 
 def close(controller, pole, gain, steps, reading, period=PERIOD, offset=0.0):

@@ -1,6 +1,7 @@
 """A window shows the episode at real time and closes cleanly; without a screen in tests."""
 
 import copy
+import subprocess
 import sys
 import time
 
@@ -106,6 +107,25 @@ def test_without_pygame_it_says_what_installs_it(make, monkeypatch):
     monkeypatch.setitem(sys.modules, "pygame", None)
     with pytest.raises(gym.error.DependencyNotInstalled, match=r"pip install \"pma-gym\[view\]"):
         make(render_mode="human")
+    result = subprocess.run(
+        [sys.executable, "-c", _WITHOUT.format("pygame", "from pma_gym.cli import main; main()")],
+        capture_output=True,
+        text=True,
+    )
+    assert result.returncode == 2 and result.stderr.count("\n") == 1
+    assert 'pip install "pma-gym[view]"' in result.stderr
+
+
+_WITHOUT = "import sys; sys.modules['{}'] = None; sys.argv = ['pma-gym', 'watch']; {}"
+
+
+def test_without_the_extra_sb3_says_in_one_line_what_installs_it():
+    code = _WITHOUT.format("stable_baselines3", "import pma_gym.sb3")
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert "During handling" not in result.stderr and result.stderr.splitlines()[-1] == (
+        "ModuleNotFoundError: pma_gym.sb3 needs stable_baselines3, which is not installed: "
+        'pip install "pma-gym[rl]"'
+    )
 
 
 @pytest.mark.parametrize("width", [0, 396, 402, 3204, 800.0, True, "800"])

@@ -136,6 +136,23 @@ def test_attributes_cannot_be_set_and_the_message_says_what_to_do(name):
     assert not envs.has_attr("mine")
 
 
+def test_pressures_of_later_episodes_can_be_set_with_the_checks_of_the_option():
+    envs = SB3VecEnv(3, **MADE | {"max_episode_steps": 2})
+    with pytest.raises(ValueError, match=r"pressure_kpa must be a number in 150-575 kPa.*got 900"):
+        envs.set_attr("pressure_kpa", 900)
+    before = envs.get_attr("pressure_kpa")
+    envs.reset()
+    envs.set_attr("pressure_kpa", np.float64(450.0), indices=[1])
+    envs.set_attr("pressure_kpa", [200, 210], indices=2)
+    assert envs.get_attr("pressure_kpa") == [before[0], 450.0, [200.0, 210.0]]
+    for _ in range(2):
+        envs.step(np.full((3, 1), -1.0, np.float32))
+    # The episodes that began by themselves have them.
+    assert envs.get_attr("time") == [0.0] * 3
+    assert envs.get_attr("pressure")[1] == 450e3
+    assert envs.get_attr("pressure")[2] in (200e3, 210e3)
+
+
 def test_methods_act_on_the_environments_that_are_asked_for():
     envs = SB3VecEnv(3, **MADE)
     envs.seed(5)

@@ -1,6 +1,6 @@
 """Resets of episodes: random draws, equilibrium and disturbances."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -52,7 +52,6 @@ class Episodes(EngineMemory):
         rig = rig_model(task, replace(options, model=self.nominal_model))
         nominal = Plant(rig, options.tolerance)
         self.rest_motor = motor_at_rest(self.nominal_model, task)
-        # Never written to: what follows from them is kept.
         usual = [options.pressure_kpa] * count if pressures is None else pressures
         self.wanted = tuple(usual)
         self._possible: set[str] = set()
@@ -60,7 +59,7 @@ class Episodes(EngineMemory):
         super().__init__(task, options, self.nominal_model, nominal, count, single)
         self._rest = NoLoadEquilibria(self.nominal)
         self._settling = self._slack_range()
-        self._usual = self._ranges.copy() if self._settles(self.wanted) else None
+        self.set_pressures({})
         self._reset_arguments = self._arguments.copy()
         # Of steps, which have theirs elsewhere.
         self._reset_arguments[ARGUMENTS.index("attempts")] = 0
@@ -79,6 +78,18 @@ class Episodes(EngineMemory):
     def is_seeded(self, index: int) -> bool:
         """Whether an environment has a seed."""
         return bool(self._episodes[index] >= 0 or self._keys[index].any())
+
+    def set_pressures(self, wanted: Mapping[int, Pressure]) -> None:
+        """Begin later episodes of some environments at other pressures.
+
+        Args:
+            wanted: as the option `pressure_kpa`, by the index of the environment.
+        Raises:
+            ValueError: an exercise's device cannot give what is prescribed there.
+        """
+        self._check_prescription(wanted.values())
+        self.wanted = tuple(wanted.get(i, one) for i, one in enumerate(self.wanted))
+        self._usual = self._ranges.copy() if self._settles(self.wanted) else None
 
     def reset(self, indices: NDArray[np.int64], wanted: Sequence[Pressure] | None = None) -> None:
         """Begin an episode: draw pressure and station, settle, zero the sensors.
@@ -154,7 +165,7 @@ class Episodes(EngineMemory):
         self.pressures[indices] = pressures
         self._fill(indices, states, zero, regulator)
 
-    def _check_prescription(self, wanted: Sequence[Pressure]) -> None:
+    def _check_prescription(self, wanted: Iterable[Pressure]) -> None:
         """Refuse pressures at which an exercise's device cannot give what is prescribed."""
         if self.task.exercise is None:
             return
