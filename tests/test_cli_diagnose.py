@@ -1,6 +1,7 @@
 """`pma-gym diagnose` and `fit` around a stand-in for the engine: files, exit codes, messages."""
 
 import json
+import subprocess
 import sys
 from dataclasses import replace
 
@@ -148,6 +149,30 @@ def test_ctrl_c_says_how_to_go_on(run, engine, tmp_path):
     assert "lab-diagnosis holds an unfinished run; --resume goes on with it, --force begins" in err
     assert run("diagnose", "lab", "--resume")[0] == 0
     assert "unfinished" not in names(tmp_path / "lab-diagnosis")
+
+
+_BUSY = """
+import hashlib, os, signal, sys, threading
+from pma_gym import discovery
+from pma_gym.cli import main
+
+def diagnose(*trials, **options):
+    threading.Timer(0.2, os.kill, (os.getpid(), signal.SIGINT)).start()
+    hashlib.pbkdf2_hmac("sha256", b"", b"", 2**31 - 1)
+
+discovery.diagnose = diagnose
+main(["diagnose", "lab"])
+"""
+
+
+def test_ctrl_c_is_heard_while_compiled_code_runs(run, tmp_path):
+    """An integration of many minutes does not return; the process ends all the same."""
+    done = subprocess.run(
+        [sys.executable, "-c", _BUSY], cwd=tmp_path, capture_output=True, text=True, timeout=120
+    )
+    assert (done.returncode, done.stdout) == (130, "")
+    assert done.stderr.endswith("interrupted; nothing was finished yet\n")
+    assert names(tmp_path) == ["lab"]
 
 
 def test_ctrl_c_in_a_fit_leaves_nothing(run, engine, tmp_path):

@@ -1,9 +1,14 @@
 """`pma-gym diagnose` and `pma-gym fit`: a lab's logs against a model."""
 
 import json
+import os
 import platform
+import signal
+import socket
 import sys
-from collections.abc import Callable
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -24,6 +29,8 @@ if TYPE_CHECKING:
     from pma_gym.discovery.diagnosis import Diagnosis
 
 INTERRUPTED = 130
+LONGEST_S = 1.5
+"""How long after Ctrl-C a compiled integration may go on."""
 DEFAULT_MODEL = "station"
 _FITTED = (
     "schema",
@@ -190,12 +197,56 @@ def _run(
         from pma_gym.discovery.fitting.journal import JournalWarning
 
         with StepProgress(time_left) as progress, warnings_said_at_once(JournalWarning):
-            return function(trials, model, progress=progress, **arguments)
+
+            def leave() -> None:
+                progress.__exit__()
+                _say_interrupted(results)
+                results.abandon()
+
+            with _interruptible(leave):
+                return function(trials, model, progress=progress, **arguments)
     except KeyboardInterrupt:
-        kept = results.journal.is_dir()
-        how = "the same command with --resume goes on" if kept else "nothing was finished yet"
-        say(f"interrupted; {how}")
+        _say_interrupted(results)
         raise typer.Exit(INTERRUPTED) from None
+
+
+def _say_interrupted(results: Results) -> None:
+    kept = results.journal.is_dir()
+    how = "the same command with --resume goes on" if kept else "nothing was finished yet"
+    say(f"interrupted; {how}")
+
+
+@contextmanager
+def _interruptible(leave: Callable[[], None]) -> Iterator[None]:
+    """Let Ctrl-C end the process soon, even within a compiled integration of many seconds.
+
+    Python hears an interrupt when the compiled code returns. Every finished fit is in a file of its
+    own, so that nothing is lost where the process ends before.
+
+    Args:
+        leave: what is done before the process ends.
+    """
+    over, (reader, writer) = threading.Event(), socket.socketpair()
+    writer.setblocking(False)
+
+    def watch() -> None:
+        while heard := reader.recv(1):
+            if heard[0] == signal.SIGINT and not over.wait(LONGEST_S):
+                leave()
+                sys.stderr.flush()
+                os._exit(INTERRUPTED)
+
+    watcher = threading.Thread(target=watch, daemon=True)
+    watcher.start()
+    before = signal.set_wakeup_fd(writer.fileno(), warn_on_full_buffer=False)
+    try:
+        yield
+    finally:
+        over.set()
+        signal.set_wakeup_fd(before)
+        writer.close()
+        watcher.join()
+        reader.close()
 
 
 def _origin(folder: Path, trials: Dataset, seed: int) -> dict[str, str]:

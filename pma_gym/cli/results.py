@@ -80,9 +80,13 @@ class Results:
                 self._drop_journal()
             yield
         except BaseException:
-            if not any(self.folder.iterdir()):
-                self.folder.rmdir()
+            self.abandon()
             raise
+
+    def abandon(self) -> None:
+        """Remove the folder if a run left nothing in it."""
+        if not any(self.folder.iterdir()):
+            self.folder.rmdir()
 
     def write(self, files: Mapping[str, bytes]) -> None:
         """Write all files atomically, and remove files of an older result that are not replaced."""
