@@ -29,11 +29,15 @@ def derivatives(values: Sequence[Value], wrt: Sequence[Value]) -> list[list[Slop
     Raises:
         TypeError: a value that depends on one of `wrt` through its bits.
     """
-    known = [values[0].graph.slopes.get(node.id) for node in order(values)] if values else []
-    # What a value is known to depend on may have been simplified out of what it is made of.
-    nodes = order([*values, *(entry[0] for entry in known if entry)])
+    nodes = order(values, _depends_on)
     columns = [_along(nodes, seed, {other.id for other in wrt}) for seed in wrt]
     return [[column[value.id] for column in columns] for value in values]
+
+
+def _depends_on(value: Value) -> Sequence[Value]:
+    """What a value's derivative is made of: what it is known by, else what it is made of."""
+    known = value.graph.slopes.get(value.id)
+    return known[:1] if known else value.operands
 
 
 def _along(nodes: list[Value], seed: Value, held: set[int]) -> dict[int, Slope]:

@@ -4,13 +4,12 @@ What is written in the operators and in these runs on all three: the laws themse
 than `where`, random numbers need the others.
 """
 
-import math
 from typing import Any
 
 import numpy as np
 
 from pma_gym.codegen.folding import compute
-from pma_gym.codegen.graph import Value
+from pma_gym.codegen.value import Value
 
 
 def where(condition: Any, yes: Any, no: Any) -> Any:  # noqa: ANN401
@@ -73,7 +72,7 @@ def from_bits(bits: Any) -> Any:  # noqa: ANN401
 
 
 def floor(real: Any) -> Any:  # noqa: ANN401
-    """The greatest whole number that is not above, as a real.
+    """The greatest whole number that is not above, as a real; what is not finite stays.
 
     >>> floor(-1.5), floor(np.array([-1.5])).tolist()
     (-2.0, [-2.0])
@@ -82,11 +81,11 @@ def floor(real: Any) -> Any:  # noqa: ANN401
         return real.graph.apply("floor", real)
     if isinstance(real, np.ndarray | np.generic):
         return np.floor(real)
-    return float(math.floor(real))
+    return compute("floor", "real", [real])
 
 
 def square_root(real: Any) -> Any:  # noqa: ANN401
-    """The square root, correctly rounded, which a library's x ** 0.5 need not be.
+    """The square root, correctly rounded, which a library's x ** 0.5 need not be; NaN below 0.
 
     >>> square_root(4.0), square_root(np.array([4.0])).tolist()
     (2.0, [2.0])
@@ -95,4 +94,4 @@ def square_root(real: Any) -> Any:  # noqa: ANN401
         return real.graph.apply("square_root", real)
     if isinstance(real, np.ndarray | np.generic):
         return np.sqrt(real)
-    return math.sqrt(real)
+    return compute("square_root", "real", [real])

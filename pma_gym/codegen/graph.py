@@ -8,6 +8,7 @@ roundings of the law's text, with the exceptions that `folding` lists.
 import struct
 from typing import Any
 
+from pma_gym.codegen import elementary  # noqa: F401 - fills the functions of values
 from pma_gym.codegen.folding import simplify
 from pma_gym.codegen.value import (
     CHANGING,

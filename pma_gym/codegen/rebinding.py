@@ -1,7 +1,7 @@
 """Evaluation of a law with other kinds of number: NumPy arrays, SymPy expressions.
 
-A law calls nothing but the functions of `pma_gym.effects.arithmetic`; binding those anew gives the
-same law for another kind of number, without a second copy of it.
+A law calls nothing but the functions of `pma_gym.effects.arithmetic` and NumPy's; binding those
+anew gives the same law for another kind of number, without a second copy of it.
 """
 
 import types
@@ -37,6 +37,8 @@ def _rebind(
         value = own.get(name)
         if name in names:
             own[name] = names[name]
+        elif value is np:
+            own[name] = types.SimpleNamespace(**{**vars(np), **names})
         elif isinstance(value, types.FunctionType):
             own[name] = _rebind(value, names, done)
     return fresh

@@ -66,7 +66,7 @@ def python_text(
             text = _expression(value, [names[part.id] for part in value.operands], arrays)
             called.update(re.findall(r"([a-z_]+)\(", text))
             lines.append(f"    v{value.id} = {text}")
-    imported = ", ".join(sorted(called - {"abs"}))
+    imported = ", ".join(sorted(called - {"abs", "float"}))
     arguments = ", ".join(names[value.id] for value in inputs)
     results = "".join(f"{names[value.id]}, " for value in outputs).rstrip()
     return "\n".join(

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable, Sequence
 from functools import cache
+from operator import attrgetter
 from typing import Any
 
 from pma_gym.codegen.generic import sloping, where
@@ -27,15 +28,17 @@ def _traceable(law: Callable) -> Callable:
     return rebind(law, {"where": where, "sloping": sloping})
 
 
-def order(outputs: Iterable[Value]) -> list[Value]:
-    """All that the outputs are made of, and themselves, operands before what is made of them."""
+def order(
+    outputs: Iterable[Value], parts: Callable[[Value], Iterable[Value]] = attrgetter("operands")
+) -> list[Value]:
+    """All that the outputs are made of, and themselves, parts before what is made of them."""
     seen: dict[int, Value] = {}
     waiting = list(outputs)
     while waiting:
         value = waiting.pop()
         if value.id not in seen:
             seen[value.id] = value
-            waiting.extend(value.operands)
+            waiting.extend(parts(value))
     # Values are numbered in order of making, operands first.
     return [seen[i] for i in sorted(seen)]
 

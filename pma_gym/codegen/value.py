@@ -1,7 +1,10 @@
 """A value of a graph: one number of a calculation that is yet to run, with a number's operators."""
 
 from abc import ABC, abstractmethod
-from typing import Any, Literal
+from collections.abc import Callable
+from typing import Any, Literal, NoReturn
+
+import numpy as np
 
 Kind = Literal["real", "integer", "truth"]
 Number = float | int | bool
@@ -15,13 +18,17 @@ CONSTANT = -1
 MASK = (1 << 64) - 1
 COMPARISONS = ("less", "less_equal", "equal", "not_equal")
 
+NUMPY: dict[str, Callable] = {}
+"""Functions for values by NumPy's names; `elementary`, which builds on values, fills it."""
+
 
 class Value:
     """One node of a graph, with the operators of a number.
 
-    Values are made by a `Graph` and by arithmetic on other values. Reals have + - * / `abs`,
-    `** 0.5`, `** 2` and comparisons; integers, which are unsigned and wrap at 64 bits, + - * & | ^
-    << >> and comparisons; truths & | ~. A float or int on either side is taken as a constant.
+    Values are made by a `Graph` and by arithmetic on other values. Reals have + - * / ** `abs`,
+    comparisons, and the functions of NumPy that `elementary` lists; integers, which are unsigned
+    and wrap at 64 bits, + - * & | ^ << >> and comparisons; truths & | ~. A float or int on either
+    side is taken as a constant.
 
     Attributes:
         graph: the graph that it belongs to.
@@ -34,8 +41,6 @@ class Value:
     """
 
     __slots__ = ("data", "graph", "id", "kind", "level", "operands", "operation")
-    # NumPy leaves the arithmetic to the value instead of spreading it over an array.
-    __array_ufunc__ = None
 
     def __init__(
         self,
@@ -138,12 +143,27 @@ class Value:
     def __invert__(self) -> "Value":
         return self.graph.apply("not", self)
 
-    def __pow__(self, exponent: float) -> "Value":
-        if exponent == 0.5:
-            return self.graph.apply("square_root", self)
-        if exponent == 2:
-            return self * self
-        raise TypeError(f"a traced value has the powers 0.5 and 2 only, got {exponent!r}")
+    def __pow__(self, exponent: "Value | Number") -> "Value":
+        return NUMPY["power"](self, exponent)
+
+    def __rpow__(self, base: Number) -> "Value":
+        return NUMPY["power"](base, self)
+
+    def __float__(self) -> NoReturn:
+        raise TypeError(
+            "a traced value is no number yet: use NumPy's functions, such as np.tanh(x), not math's"
+        )
+
+    def __array_ufunc__(self, function: Any, method: str, *given: Any, **options: Any) -> Any:  # noqa: ANN401
+        return self.__array_function__(function, (), given, options | dict(method=method))
+
+    def __array_function__(self, function: Any, _types: Any, given: Any, options: Any) -> Any:  # noqa: ANN401
+        name = function.__name__
+        if options.pop("method", "__call__") != "__call__" or options or name not in NUMPY:
+            raise TypeError(f"laws have no np.{name} like this; of np they have {', '.join(NUMPY)}")
+        if any(isinstance(each, np.ndarray) for each in given):
+            return NotImplemented
+        return NUMPY[name](*(one.item() if isinstance(one, np.generic) else one for one in given))
 
 
 class ValueGraph(ABC):

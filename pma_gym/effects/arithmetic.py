@@ -1,12 +1,49 @@
 """Arithmetic functions for the laws of effects.
 
-Every law uses + - * / `abs` `**0.5`, `floor` of `pma_gym.codegen.generic` and the functions below,
-nothing else. Each is one scalar expression without side effects, so that the same text runs as
-plain Python, compiled for one trial and in SIMD lanes with the same bits. `as_numpy`
-rebinds `where` for NumPy arrays.
+Every law uses + - * / ** `abs`, comparisons, the functions of `pma_gym.codegen.elementary` by these
+names or as NumPy's (`np.exp`), and the functions below, nothing else. Each is one scalar expression
+without side effects, so that the same text runs as plain Python, compiled for one trial and in SIMD
+lanes with the same bits. `as_numpy` rebinds `where` for NumPy arrays.
 """
 
+from pma_gym.codegen.elementary import (
+    clip,
+    cos,
+    exp,
+    interp,
+    interp2d,
+    log,
+    maximum,
+    minimum,
+    power,
+    sign,
+    sin,
+    sqrt,
+    tanh,
+)
 from pma_gym.codegen.generic import floor
+
+__all__ = [
+    "clip",
+    "cos",
+    "cosine",
+    "exp",
+    "exponential",
+    "interp",
+    "interp2d",
+    "log",
+    "maximum",
+    "minimum",
+    "positive",
+    "power",
+    "sign",
+    "sin",
+    "sloping",
+    "smoothstep",
+    "sqrt",
+    "tanh",
+    "where",
+]
 
 _PI = 3.141592653589793
 
@@ -23,15 +60,6 @@ def positive(value):
     (3.5, 0.0)
     """
     return 0.5 * (value + abs(value))
-
-
-def clip(value, lower, upper):
-    """Limit the value to two bounds; exact.
-
-    >>> clip(5.0, 0.0, 1.0), clip(0.25, 0.0, 1.0)
-    (1.0, 0.25)
-    """
-    return where(value < lower, lower, where(value > upper, upper, value))
 
 
 def smoothstep(value):
@@ -58,9 +86,8 @@ def sloping(value, argument, slope):
 def exponential(value):
     """Compute exp(value) by Taylor's series at value/128, squared seven times.
 
-    Relative error below 1e-12 for |value| <= 12, the range of the force laws. A library exp
-    would neither vectorise nor give the same bits on every machine. A Pade quotient needs a
-    division, which takes as long as eight products.
+    Relative error below 1e-12 for |value| <= 12, the range of the catalogue's laws, in half of the
+    arithmetic of `exp`. A Pade quotient needs a division, which takes as long as eight products.
 
     >>> import math
     >>> abs(exponential(-8.0) / math.exp(-8.0) - 1.0) < 1e-12
@@ -82,9 +109,9 @@ def exponential(value):
 def cosine(value):
     """Compute cos(value) by Taylor's series of 1 - cos at value/256 and eight angle doublings.
 
-    Absolute error below 1e-11 for |value| <= 1e4. Working with u = 1 - cos keeps the digits
-    where u is small: doubling the angle turns u into 2 u (2 - u). Beyond 300 rad, where the series
-    ends, whole turns are taken off first.
+    Absolute error below 1e-11 for |value| <= 1e4, in half of the arithmetic of `cos`. Working with
+    u = 1 - cos keeps the digits where u is small: doubling the angle turns u into 2 u (2 - u).
+    Beyond 300 rad, where the series ends, whole turns are taken off first.
 
     >>> import math
     >>> max(abs(cosine(0.5 * i) - math.cos(0.5 * i)) for i in range(-20000, 20001)) < 1e-11
@@ -100,20 +127,3 @@ def cosine(value):
     for _ in range(8):
         below = 2.0 * below * (2.0 - below)
     return 1.0 - below
-
-
-def interpolate(value, knots, heights):
-    """Interpolate linearly between knots; the result is constant outside them.
-
-    Args:
-        value: where to interpolate.
-        knots: tuple of increasing floats.
-        heights: tuple of as many floats.
-    Returns:
-        The height at `value`.
-    """
-    height = heights[0]
-    for i in range(len(knots) - 1):
-        share = clip((value - knots[i]) / (knots[i + 1] - knots[i]), 0.0, 1.0)
-        height = height + share * (heights[i + 1] - heights[i])
-    return height

@@ -6,6 +6,8 @@ Each rule returns the error with its fix, or an empty string.
 from collections.abc import Callable, Iterator
 from types import CodeType, FunctionType, ModuleType
 
+import numpy as np
+
 from pma_gym.codegen.graph import CHANGING, FIXED, Graph
 from pma_gym.codegen.trace import trace
 from pma_gym.effects.effect import Effect, signals
@@ -129,9 +131,9 @@ def _arithmetic(effect: Effect, _module: ModuleType) -> str:
         except Exception as error:
             form = "(source, decay)" if law is effect.rate else "one number"
             return (
-                f"has a law that cannot be compiled: {law.__name__}: {error}; use + - * / abs() "
-                f"**0.5 and pma_gym.effects.arithmetic (where, positive, clip, ...) instead of if, "
-                f"max and math, and return {form}"
+                f"has a law that cannot be compiled: {law.__name__}: {error}; use + - * / ** abs() "
+                f"and NumPy's functions (np.where, np.maximum, np.exp, ...) instead of if, max and "
+                f"math, and return {form}"
             )
     return ""
 
@@ -148,9 +150,12 @@ def _absence(effect: Effect, _module: ModuleType) -> str:
         known = {name: share * example(name) for name in signals(law)}
         if effect.port.startswith(("drive_", "regulator_")):
             known = {name: abs(value) for name, value in known.items()}
+        # NumPy's numbers have no complex powers.
+        known = {name: np.float64(value) for name, value in known.items()}
         known |= {"p": effect.neutral, "memory": _memories(effect, lambda _: 0.0)}
         try:
-            given = law(*(known[name] for name in signals(law)))
+            with np.errstate(all="ignore"):
+                given = law(*(known[name] for name in signals(law)))
         except ZeroDivisionError:
             return f"divides by 0 at its neutral values, in {law.__name__}; change the formula"
         expected = known[absent] if isinstance(absent, str) else absent
@@ -159,6 +164,7 @@ def _absence(effect: Effect, _module: ModuleType) -> str:
             return (
                 f"is not absent at its neutral values: {law.__name__} gives {given:g} at {at} "
                 f"(SI), and {expected:g} would change nothing at port {effect.port}"
+                + ("; take powers and logarithms of abs(x)" if np.isnan(given) else "")
             )
     return ""
 

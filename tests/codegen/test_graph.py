@@ -205,8 +205,6 @@ def test_truths_combine(graph, x, y):
 def test_mistakes_are_named(graph, x):
     with pytest.raises(TypeError, match="use where"):
         bool(x > 0.0)
-    with pytest.raises(TypeError, match="powers 0.5 and 2 only, got 3"):
-        x**3
     with pytest.raises(ValueError, match="two graphs"):
         x + Graph().input("x", CHANGING)
     with pytest.raises(ValueError, match="input x is real of level 2 already"):
@@ -217,7 +215,7 @@ def test_mistakes_are_named(graph, x):
         graph.input("i", CHANGING, "integer") + 1.5
     with pytest.raises(TypeError, match="plain number of 0 to 63 bits"):
         graph.input("i", CHANGING, "integer") << 64
-    with pytest.raises(TypeError, match="does not support ufuncs"):
+    with pytest.raises(TypeError, match="NotImplemented"):
         x + np.zeros(2)
     with pytest.raises(TypeError, match="unsupported operand"):
         x + "1"

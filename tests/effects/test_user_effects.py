@@ -99,6 +99,27 @@ def test_the_example_of_the_documentation_works(write):
     assert drag.name == "drag" and drag.usual.factor == pytest.approx(2e4)
 
 
+@pytest.mark.parametrize(
+    "law",
+    [
+        "velocity**3",
+        "velocity * abs(velocity) ** (2 / 3)",
+        "np.tanh(1e3 * velocity) * np.exp(-np.square(velocity))",
+        "np.sign(velocity) * np.log(1.0 + np.sqrt(np.abs(velocity)))",
+        "interp2d(velocity, pressure, (-1.0, 1.0), (0.0, 3e5), ((-1.0, 1.0), (-2.0, 2.0)))",
+    ],
+)
+def test_a_law_in_numpys_words_slows_a_station(law, write, station):
+    text = broken("velocity * abs(velocity)", law).replace(
+        "drag(velocity", "drag(pressure, velocity"
+    )
+    load_effects(write(f"import numpy as np\n{text}".replace("import where", "import interp2d")))
+    plain, neutral = way(station), way(Plant(station.model.with_effects(["drag"])))
+    np.testing.assert_allclose(neutral, plain, rtol=1e-12)
+    slow = way(Plant(station.model.with_effects({"drag": {"factor_n_s2_per_mm2": 1e-4}})))
+    assert 1e-6 < (plain - slow).max() < 1e-2
+
+
 def test_loading_a_file_again_changes_nothing(write):
     path = write(DRAG)
     first, second = load_effects(path), load_effects(str(path))
@@ -178,7 +199,14 @@ BROKEN = {
     ),
     "plain": (broken("factor: Annotated", "factor: float\n    other: Annotated"), r"no NamedTuple"),
     "branch": (broken("return -", "return 0.0 if velocity > 0.0 else -"), r"cannot be compiled"),
-    "math": (broken("abs(velocity)", "__import__('math').sin(velocity)"), r"use \+ - \* / abs"),
+    "math": (
+        broken("abs(velocity)", "__import__('math').sin(velocity)"),
+        r"np.tanh\(x\), not math's; use ",
+    ),
+    "negative": (
+        broken("abs(velocity)", "velocity ** (2 / 3)"),
+        r"gives nan at velocity -0.05 \(SI\), .*; take powers and logarithms of abs\(x\)",
+    ),
     "default": (
         broken("usual=0.02)\n    ]", "usual=0.02)\n    ] = 3.0"),
         r"gives factor a default of 3.0 \(SI\) and another usual value, 0.02 N s\^2/mm\^2",

@@ -2,7 +2,7 @@
 
 from typing import Annotated, NamedTuple
 
-from pma_gym.effects.arithmetic import interpolate, positive, where
+from pma_gym.effects.arithmetic import interp, positive, where
 from pma_gym.effects.effect import Effect
 from pma_gym.units import Quantity
 
@@ -41,9 +41,9 @@ def mapped_displacement(motor_voltage, pressure, p):
     Source:
         Serres 2008, table 18.
     """
-    square = interpolate(pressure, p.pressure, p.square)
-    linear = interpolate(pressure, p.pressure, p.linear)
-    constant = interpolate(pressure, p.pressure, p.constant)
+    square = interp(pressure, p.pressure, p.square)
+    linear = interp(pressure, p.pressure, p.linear)
+    constant = interp(pressure, p.pressure, p.constant)
     # Only a parabola that opens downwards has a peak to be held at.
     peak = where(square < 0.0, linear / (-2.0 * where(square < 0.0, square, -1.0)), motor_voltage)
     voltage = motor_voltage - positive(motor_voltage - peak)

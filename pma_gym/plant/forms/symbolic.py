@@ -4,6 +4,7 @@ from collections.abc import Callable, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
+from pma_gym.codegen import elementary
 from pma_gym.codegen.rebinding import rebind
 from pma_gym.plant.compiled_model import CompiledModel
 from pma_gym.plant.forms.notation import Names, Notation
@@ -41,19 +42,22 @@ class _Expressions(Notation):
         """What the functions of `pma_gym.effects.arithmetic` are for SymPy."""
         import sympy
 
-        def interpolate(
-            value: "sympy.Expr", knots: Sequence["sympy.Symbol"], heights: Sequence["sympy.Symbol"]
-        ) -> "sympy.Expr":
-            row = heights[0].name.partition("[")[0].replace(".", "_")
-            return sympy.Function(row, real=True)(value)
+        def interp(x: "sympy.Expr", xp: Sequence[Any], fp: Sequence[Any]) -> "sympy.Expr":
+            if not isinstance(fp[0], sympy.Symbol):
+                return rebind(elementary.interp, self._arithmetic)(x, xp, fp)
+            row = fp[0].name.partition("[")[0].replace(".", "_")
+            return sympy.Function(row, real=True)(x)
 
         return {
             "where": lambda condition, yes, no: sympy.Piecewise((yes, condition), (no, True)),
             "positive": lambda value: sympy.Max(0, value),
             "clip": lambda value, lower, upper: sympy.Min(sympy.Max(value, lower), upper),
+            **{name: getattr(sympy, name) for name in ("exp", "log", "tanh", "sin", "cos", "sqrt")},
+            **{"minimum": sympy.Min, "maximum": sympy.Max, "sign": sympy.sign, "abs": sympy.Abs},
+            **{"absolute": sympy.Abs, "power": sympy.Pow, "square": lambda x: x * x},
             "exponential": sympy.exp,
             "cosine": sympy.cos,
-            "interpolate": interpolate,
+            "interp": interp,
         }
 
     def apply(self, law: Callable, *arguments: Any) -> Any:  # noqa: ANN401
