@@ -35,7 +35,7 @@ class PID:
     The derivative is of the error: on a ramp that of the measurement alone would push against
     the motion all the time, which the integral would have to make good.
 
-    Gains come from `controllers/design/gains.json`, where `benchmarks/tuning/tune.py` wrote them:
+    Gains come from `controllers/design/gains.toml`, where `benchmarks/tuning/tune.py` wrote them:
     of the nearest loop (control rate and delay) and the kind of task, linear in pressure between
     the pressures that it tuned at and constant beyond, and varying with the reference
     (`Gains.scaled`). They are those under the model's name, else, for a model of one's own, those

@@ -19,7 +19,7 @@ from benchmarks.commands.options import (
 def register(app: typer.Typer) -> None:
     """Add the commands to the program."""
     app.command(
-        epilog="Example: python -m benchmarks tune --only '50hz*/rotation' --out gains.json"
+        epilog="Example: python -m benchmarks tune --only '50hz*/rotation' --out gains.toml"
     )(tune)
     app.command(epilog="Example: python -m benchmarks design --controllers lqg --out designs.json")(
         design

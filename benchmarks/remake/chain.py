@@ -20,7 +20,7 @@ from controllers.policies.policy_file import load_policy_file
 from controllers.policy import shipped_policies
 
 MODEL = Path("pma_gym/models/station.toml")
-GAINS = Path("controllers/design/gains.json")
+GAINS = Path("controllers/design/gains.toml")
 DESIGNS = Path("controllers/design/designs.json")
 POLICIES = Path("controllers/policies/shipped")
 SUITES = Path("benchmarks/suites")

@@ -29,9 +29,10 @@ on from there.
 """
 
 import hashlib
-import json
 import platform
+import re
 import sys
+from collections.abc import Mapping
 from functools import partial
 from importlib.metadata import version
 from pathlib import Path
@@ -54,9 +55,10 @@ from controllers.design.gains import GAINS_FILE, SCHEMA, Gains, column_names
 from controllers.feedforward_pid import FeedforwardPID
 from controllers.pid import PID
 from pma_gym.document_shape import Whole, check_shape
-from pma_gym.documents import read_json
+from pma_gym.documents import read_toml
 from pma_gym.plant.model import Model, dump_model, load_model
 from pma_gym.plant.plant import Plant
+from pma_gym.plant.toml import toml_text
 from pma_gym.tasks import EVERY_TASK
 from pma_gym.terminal import SafeConsole
 
@@ -107,7 +109,7 @@ def run_tune(
     """
     known, document = load_model(model), _read(out)
     rows = table_rows(known, seed, only)
-    kept = KeptRows(out, _provenance(known, seed) | {"evaluations": EVALUATIONS})
+    kept = KeptRows(out, {"source": _source(known, seed), "evaluations": EVALUATIONS})
     left = [row for row in rows if name_of(row) not in kept.rows]
     if len(left) < len(rows):
         print(
@@ -119,12 +121,10 @@ def run_tune(
         print(_interrupted(done, len(rows), kept.path, out), file=sys.stderr)
         return False
     tables = _tables(rows, [kept.rows[name_of(row)] for row in rows])
-    provenance = {
-        loop: dict.fromkeys(kinds, _provenance(known, seed)) for loop, kinds in tables.items()
-    }
-    _merge(document["models"].setdefault(known.name, {}), tables)
-    _merge(document["provenance"].setdefault(known.name, {}), provenance)
-    _write(out, document)
+    for loop, kinds in tables.items():
+        loops = document.setdefault(known.name, {}).setdefault(loop, {})
+        loops |= {kind: {"source": _source(known, seed)} | table for kind, table in kinds.items()}
+    write_text(out, _text(document))
     kept.forget()
     return True
 
@@ -146,12 +146,6 @@ def table_rows(model: Model, seed: int, only: str) -> list[Job]:
     ]
     wanted = chosen((f"{row.loop}/{row.kind}" for row in rows), only)
     return [row for row in rows if f"{row.loop}/{row.kind}" in wanted]
-
-
-def _merge(into: dict[str, Any], tables: dict[str, Any]) -> None:
-    """Put new entries by loop and kind into a document's."""
-    for loop, kinds in tables.items():
-        into.setdefault(loop, {}).update(kinds)
 
 
 def _interrupted(done: int, total: int, kept: Path, out: Path) -> str:
@@ -238,34 +232,48 @@ def _tables(jobs: list[Job], results: list[tuple[Gains, float]]) -> dict[str, An
     return tables
 
 
-def _provenance(model: Model, seed: int) -> dict[str, Any]:
-    return {
-        "written_by": "benchmarks/tuning/tune.py",
-        "model_sha256": hashlib.sha256(dump_model(model).encode()).hexdigest(),
-        "seed": seed,
-        "versions": {
-            "python": platform.python_version(),
-        }
-        | {name: version(name) for name in ("numpy", "scipy", "llvmlite")},
-    }
+def _source(model: Model, seed: int) -> str:
+    """Where a table's gains come from, on one line."""
+    packages = ", ".join(f"{name} {version(name)}" for name in ("numpy", "scipy", "llvmlite"))
+    digest = hashlib.sha256(dump_model(model).encode()).hexdigest()
+    return (
+        f"python -m benchmarks tune, seed {seed}, model of SHA-256 {digest[:12]}, "
+        f"Python {platform.python_version()}, {packages}"
+    )
 
 
 def _read(path: Path) -> dict[str, Any]:
+    """The tables in a file of gains, by model, loop and kind of task."""
     if not path.exists():
-        return {"schema": SCHEMA, "provenance": {}, "models": {}}
+        return {}
     try:
-        document = read_json(path)
+        document = read_toml(path)
         check_shape(document, {"schema": Whole()})
-        if document["schema"] == SCHEMA:
-            check_shape(document, {"provenance": dict, "models": {"*": dict}})
+        if document.pop("schema") == SCHEMA:
+            check_shape(document, {"*": {"*": {"*": {"source": str}}}})
             return document
-    except (ValueError, KeyError, TypeError) as error:
+    except ValueError as error:
         raise ValueError(
             f"{path} is no file of gains ({error}); delete it or name another"
         ) from error
     raise ValueError(f"{path} must have schema {SCHEMA}; delete it or name another")
 
 
-def _write(path: Path, document: dict[str, Any]) -> None:
-    ordered = document | {k: dict(sorted(document[k].items())) for k in ("provenance", "models")}
-    write_text(path, json.dumps(ordered, indent=2) + "\n")
+def _text(document: Mapping[str, Any]) -> str:
+    """A file of gains: a table in TOML for each model, loop, kind of task and controller."""
+    lines = [
+        "# Gains of the PIDs by model, loop, kind of task and controller, a value a pressure;",
+        "# `python -m benchmarks tune` writes them.",
+        f"schema = {SCHEMA}",
+    ]
+    for model, loops in sorted(document.items()):
+        for loop, kinds in loops.items():
+            for kind, tables in kinds.items():
+                bare = re.fullmatch("[A-Za-z0-9_-]+", model)
+                name = f"{model if bare else toml_text(model)}.{loop}.{kind}"
+                lines += ["", f"[{name}]", f"source = {toml_text(tables['source'])}"]
+                for controller, table in tables.items():
+                    if controller != "source":
+                        lines += ["", f"[{name}.{controller}]"]
+                        lines += [f"{key} = {toml_text(tuple(v))}" for key, v in table.items()]
+    return "\n".join(lines) + "\n"

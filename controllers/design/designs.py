@@ -7,7 +7,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
-from pma_gym.documents import read_json
+from pma_gym.documents import read_json, read_toml
 from pma_gym.envs import StationInfo
 from pma_gym.tasks import Task
 
@@ -134,7 +134,7 @@ def read_settings(path: Path, schema: int, command: str) -> dict[str, Any]:
     Raises:
         ValueError: the file has another version.
     """
-    document = read_json(path)
+    document = read_toml(path) if path.suffix == ".toml" else read_json(path)
     got = document.get("schema") if isinstance(document, dict) else None
     if got != schema:
         raise ValueError(

@@ -17,10 +17,10 @@ from pma_gym.data.signals import SIGNALS
 from pma_gym.envs import StationInfo
 from pma_gym.units import SI_FACTORS
 
-GAINS_FILE = Path(__file__).with_name("gains.json")
+GAINS_FILE = Path(__file__).with_name("gains.toml")
 """The gains of the controllers here, with where they come from."""
 
-SCHEMA = 2
+SCHEMA = 3
 
 START_SHARE = 0.2
 """Share of the range over which `Gains.start_factor` fades out."""
@@ -106,7 +106,7 @@ def scheduled_gains(controller: str, station: StationInfo, path: Path = GAINS_FI
     Raises:
         ValueError: there are none, or the task is an exercise, which has no position to follow.
     """
-    models = read_settings(path, SCHEMA, "tune")["models"]
+    models = read_settings(path, SCHEMA, "tune")
     must_give_a_position(station)
     model, task, kind = station.model, station.task, task_kind(station)
     name = model.name if model.name in models else model.plant

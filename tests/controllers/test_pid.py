@@ -212,13 +212,13 @@ def test_contraction_and_late_commands(kind, error, late_error, drive):
 
 
 def test_missing_gains_say_how_to_tune_them(station, tmp_path):
-    path = tmp_path / "gains.json"
-    path.write_text('{"schema": 2, "models": {}}')
+    path = tmp_path / "gains.toml"
+    path.write_text("schema = 3")
     with pytest.raises(ValueError, match=r"no gains of pid for the rotation task.*tune --model"):
         scheduled_gains("pid", station("rotation"), path)
-    path = tmp_path / "old.json"
-    path.write_text('{"schema": 0}')
-    with pytest.raises(ValueError, match=r"must have schema 2, got 0; write it anew"):
+    path = tmp_path / "old.toml"
+    path.write_text("schema = 0")
+    with pytest.raises(ValueError, match=r"must have schema 3, got 0; write it anew"):
         scheduled_gains("pid", station("rotation"), path)
 
 

@@ -135,14 +135,14 @@ def test_damaged_stages_are_made_anew(tmp_path, rubbish, capsys):
 
 
 def test_damaged_rows_of_gains_are_tuned_anew_and_the_others_stay(tmp_path, capsys):
-    kept = KeptRows(tmp_path / "gains.json", {"seed": 1})
+    kept = KeptRows(tmp_path / "gains.toml", {"seed": 1})
     gains = [0.5] * len(Gains._fields)
     rows = {"sound": [gains, 1.0], "short": [gains[1:], 1.0], "text": [gains[:-1] + ["x"], 1.0]}
     rows |= {"none": None, "cost": [gains, None]}
     kept.path.write_text(json.dumps({"made_with": kept.made_with, "rows": rows}))
-    assert KeptRows(tmp_path / "gains.json", {"seed": 1}).rows == {"sound": (Gains(*gains), 1.0)}
+    assert KeptRows(tmp_path / "gains.toml", {"seed": 1}).rows == {"sound": (Gains(*gains), 1.0)}
     said = warnings_in(capsys.readouterr().err)
     assert len(said) == 1 and "4 rows are computed anew" in said[0]
     for content in RUBBISH.values():
         kept.path.write_bytes(content)
-        assert KeptRows(tmp_path / "gains.json", {"seed": 1}).rows == {}
+        assert KeptRows(tmp_path / "gains.toml", {"seed": 1}).rows == {}

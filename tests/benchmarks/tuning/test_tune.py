@@ -1,7 +1,7 @@
 """The tuning script: its start, its margin, its file."""
 
 import itertools
-import json
+import tomllib
 from dataclasses import replace
 
 import numpy as np
@@ -60,7 +60,7 @@ def test_sensitivity_finds_the_edge_of_stability(job):
 
 def _shipped(name):
     """The jobs of every table of a model in the shipped file."""
-    loops = json.loads(GAINS_FILE.read_text())["models"][name]
+    loops = tomllib.loads(GAINS_FILE.read_text())[name]
     jobs = tune.table_rows(load_model(name), 0, "*")
     tuned = [job for job in jobs if job.kind in loops.get(job.loop, {})]
     rows = sum(
@@ -68,6 +68,7 @@ def _shipped(name):
         for kinds in loops.values()
         for controllers in kinds.values()
         for table in controllers.values()
+        if isinstance(table, dict)
     )
     assert len(tuned) == rows
     return tuned
@@ -134,17 +135,17 @@ def test_same_seed_same_bytes_and_other_models_stay(tmp_path, monkeypatch):
     monkeypatch.setattr(tune, "LOOPS", ((100.0, 0.0),))
     monkeypatch.setattr(tune, "EVALUATIONS", 6)
     monkeypatch.setattr(tune, "CONTROLLERS", ("pid",))
-    paths = [tmp_path / "one.json", tmp_path / "two.json"]
+    paths = [tmp_path / "one.toml", tmp_path / "two.toml"]
     for path in paths:
         run_tune(path, seed=3, model="cascade", jobs=1)
     assert paths[0].read_bytes() == paths[1].read_bytes()
     run_tune(paths[1], seed=3, model="station", jobs=1)
-    one, two = (json.loads(path.read_text()) for path in paths)
-    assert two["models"]["cascade"] == one["models"]["cascade"]
-    assert set(two["models"]) == set(two["provenance"]) == {"cascade", "station"}
-    row = two["models"]["station"]["100hz"]["displacement"]["pid"]
+    one, two = (tomllib.loads(path.read_text()) for path in paths)
+    assert two["cascade"] == one["cascade"]
+    assert set(two) == {"schema", "cascade", "station"}
+    assert "seed 3" in two["station"]["100hz"]["displacement"]["source"]
+    row = two["station"]["100hz"]["displacement"]["pid"]
     assert row["pressure_kpa"] == [300]
-    assert two["provenance"]["station"]["100hz"]["displacement"]["seed"] == 3
     assert not [p for p in tmp_path.iterdir() if p not in paths]
 
 
@@ -158,7 +159,7 @@ def test_only_the_tables_asked_for_are_tuned_and_others_stay(tmp_path, monkeypat
         return Gains(1.0, 2.0, 3.0, 0.005), float(len(made))
 
     monkeypatch.setattr(tune, "tuned", tuned)
-    out = tmp_path / "gains.json"
+    out = tmp_path / "gains.toml"
     assert run_tune(out, jobs=1, only="*/displacement")
     assert run_tune(out, jobs=1, only="50hz*/*")
     assert sorted(made) == [
@@ -167,7 +168,7 @@ def test_only_the_tables_asked_for_are_tuned_and_others_stay(tmp_path, monkeypat
         "50hz_delay20ms/displacement",
         "50hz_delay20ms/displacement",
     ]
-    station = json.loads(out.read_text())["models"]["station"]
+    station = tomllib.loads(out.read_text())["station"]
     assert set(station["100hz"]) == {"displacement"}
     assert set(station["50hz_delay20ms"]) == {"displacement", "contraction"}
     # A cascade has nothing to hold a load with.
@@ -176,14 +177,14 @@ def test_only_the_tables_asked_for_are_tuned_and_others_stay(tmp_path, monkeypat
 
 
 def test_broken_file_of_gains_is_refused_before_the_work(tmp_path):
-    path = tmp_path / "gains.json"
-    path.write_text("[]")
-    with pytest.raises(ValueError, match=r"gains.json is no file of gains.*delete it"):
+    path = tmp_path / "gains.toml"
+    path.write_text("schema =")
+    with pytest.raises(ValueError, match=r"gains.toml is no file of gains.*delete it"):
         run_tune(path)
-    path.write_text('{"schema": 7}')
-    with pytest.raises(ValueError, match=r"must have schema 2; delete it"):
+    path.write_text("schema = 7")
+    with pytest.raises(ValueError, match=r"must have schema 3; delete it"):
         run_tune(path)
-    assert path.read_text() == '{"schema": 7}'
+    assert path.read_text() == "schema = 7"
 
 
 def test_finished_rows_survive_an_interrupt_and_are_not_tuned_again(tmp_path, monkeypatch, capsys):
@@ -199,7 +200,7 @@ def test_finished_rows_survive_an_interrupt_and_are_not_tuned_again(tmp_path, mo
         return Gains(row.pressure_kpa / 3.0, 2.0, 3.0, 0.005), 0.1
 
     monkeypatch.setattr(tune, "tuned", tuned)
-    out = tmp_path / "gains.json"
+    out = tmp_path / "gains.toml"
     assert not run_tune(out, model="cascade", jobs=1)
     assert "1 of 2 rows are tuned and kept in" in capsys.readouterr().err
     assert [path.name for path in tmp_path.iterdir()] == ["gains.partial.json"]
@@ -211,9 +212,9 @@ def test_finished_rows_survive_an_interrupt_and_are_not_tuned_again(tmp_path, mo
     assert made == [300, 400]
     assert "1 of 2 rows are taken from" in capsys.readouterr().out
     resumed = out.read_bytes()
-    assert run_tune(tmp_path / "whole.json", model="cascade", jobs=1)
-    assert (tmp_path / "whole.json").read_bytes() == resumed
-    assert {path.name for path in tmp_path.iterdir()} == {"gains.json", "whole.json"}
+    assert run_tune(tmp_path / "whole.toml", model="cascade", jobs=1)
+    assert (tmp_path / "whole.toml").read_bytes() == resumed
+    assert {path.name for path in tmp_path.iterdir()} == {"gains.toml", "whole.toml"}
 
 
 def test_a_row_whose_process_dies_is_named(tmp_path, monkeypatch):
@@ -225,4 +226,4 @@ def test_a_row_whose_process_dies_is_named(tmp_path, monkeypatch):
     with pytest.raises(
         TuneError, match=r"row 100hz/displacement/pid/300: its process died.*kept in"
     ):
-        run_tune(tmp_path / "gains.json", model="cascade")
+        run_tune(tmp_path / "gains.toml", model="cascade")
