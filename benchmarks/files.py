@@ -1,6 +1,7 @@
 """Results on disk: each file whole or not at all, in a folder made for it."""
 
 import json
+import re
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -34,13 +35,13 @@ def toml_document(comment: str, schema: int, tables: Mapping[str, Any]) -> str:
     Args:
         comment: what the file is, its first line.
         schema: version of its form.
-        tables: tables by bare keys; sorted by the outermost.
+        tables: tables by their keys, sorted by the outermost.
 
-    >>> print(toml_document("Gains", 1, {"station": {"pid": {"lead_s": [0.1, 2]}}}), end="")
+    >>> print(toml_document("Gains", 1, {"my rig": {"pid": {"lead_s": [0.1, 2]}}}), end="")
     # Gains
     schema = 1
     <BLANKLINE>
-    [station.pid]
+    ["my rig".pid]
     lead_s = [0.1, 2]
     """
 
@@ -51,7 +52,11 @@ def toml_document(comment: str, schema: int, tables: Mapping[str, Any]) -> str:
             yield "\n".join(["", f"[{name}]", *values])
         for key, inner in table.items():
             if isinstance(inner, Mapping):
-                yield from lines(f"{name}.{key}", inner)
+                yield from lines(f"{name}.{_key(key)}", inner)
 
-    parts = [line for name in sorted(tables) for line in lines(name, tables[name])]
+    parts = [line for name in sorted(tables) for line in lines(_key(name), tables[name])]
     return "\n".join([f"# {comment}", f"schema = {schema}", *parts]) + "\n"
+
+
+def _key(name: str) -> str:
+    return name if re.fullmatch("[A-Za-z0-9_-]+", name) else json.dumps(name)

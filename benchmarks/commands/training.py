@@ -69,7 +69,7 @@ def train(
     folder = out or usual / f"{task}-{seed}"
     with _failures_in_words(folder):
         from benchmarks.training.configuration.preset import PresetError
-        from benchmarks.training.job import ordered, run_seeds, run_train
+        from benchmarks.training.train_policies import ordered, run_seeds, run_train
         from pma_gym.terminal import SafeConsole
 
         places = chosen_executor(executor, jobs)
@@ -97,7 +97,7 @@ def _failures_in_words(folder: Path) -> Iterator[None]:
     try:
         from benchmarks.training.checkpoint import CheckpointError
         from benchmarks.training.configuration.preset import PresetError
-        from benchmarks.training.job import run_train  # noqa: F401 - needs Stable-Baselines3
+        from benchmarks.training.train_policies import run_train  # noqa: F401 - needs Stable-Baselines3
     except ImportError as error:
         print(
             f"error: training needs Stable-Baselines3 ({error}); install it: "

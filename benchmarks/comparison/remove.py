@@ -5,7 +5,7 @@ import json
 from collections.abc import Sequence
 from pathlib import Path
 
-from benchmarks.runner.journal import JOURNAL, rewriting
+from benchmarks.runner.journal import JOURNAL, rewrite
 from benchmarks.runner.provenance import read_run, write_run
 from benchmarks.suites.suite import FrozenSuite, SuiteError
 
@@ -33,10 +33,7 @@ def remove_controller(name: str, suites: Sequence[FrozenSuite], results: Path) -
 
 
 def _removed(name: str, path: Path) -> int:
-    with rewriting(path) as journal:
-        kept = [line for line in journal.lines if _controller(line) != name]
-        count = len(journal.lines) - len(kept)
-        journal.lines = kept
+    count = rewrite(path, lambda line: _controller(line) != name)
     info = read_run(path.parent)
     specs = info.get("contenders")
     if isinstance(specs, dict) and name in specs:

@@ -17,7 +17,7 @@ SOURCES = (
     "pma_gym/**/*.toml",
     "pma_gym/**/*.csv",
     "controllers/**/*.py",
-    "controllers/design/*.json",
+    "controllers/design/*.toml",
     "benchmarks/runner/rollout.py",
     "benchmarks/runner/controller_spec.py",
     "benchmarks/suites/reproduction.py",

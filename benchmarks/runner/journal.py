@@ -1,17 +1,12 @@
-"""The journal of a run: one line a case, appended whole, so that a killed run loses nothing.
+"""The journal of a run: one JSON object a line and case, flushed: a killed run loses nothing.
 
-A line is a JSON object whose last member is a CRC-32 of the line without it; lines of older
-journals have none and are read as they are.
+Each row has the fingerprint of what it was computed with, see `fingerprint.key`.
 """
 
 import json
 import os
-import re
-import time
-import zlib
-from collections.abc import Iterator
-from contextlib import contextmanager
-from dataclasses import dataclass, fields
+from collections.abc import Callable, Iterator
+from dataclasses import fields
 from pathlib import Path
 
 from benchmarks.runner.case import Row
@@ -67,39 +62,9 @@ _FIGURES = {
 }
 """Shape of the figures of a case that has some."""
 
-SYNC_S = 2.0
-"""How much of the work a crash of the machine may cost (s); a killed process costs none."""
-
-
-_CHECKSUM = re.compile(rb', "crc32": "([0-9a-f]{8})"}\s*$')
-
-
-def checked_line(row: bytes) -> bytes:
-    """A line of a journal.
-
-    Args:
-        row: a JSON object that has members.
-    """
-    return b'%s, "crc32": "%08x"}\n' % (row[:-1], zlib.crc32(row))
-
-
-def verified(line: bytes, number: int) -> bytes:
-    """The row of a line, without its checksum; that of an older journal as it is.
-
-    Raises:
-        ValueError: it is not what was written.
-    """
-    checksum = _CHECKSUM.search(line)
-    if checksum is None:
-        return line
-    row = line[: checksum.start()] + b"}"
-    if zlib.crc32(row) != int(checksum[1], 16):
-        raise ValueError(f"line {number} is not what was written: its checksum does not fit")
-    return row
-
 
 class Journal:
-    """Appends rows to a file, each by one write.
+    """Appends rows to a file, each flushed whole.
 
     Several processes may append to one file: the system puts every write at its end. A line that a
     crash tore is closed before the next one, and `read_rows` passes over it.
@@ -114,7 +79,6 @@ class Journal:
         size = os.fstat(self._file).st_size
         if size and os.pread(self._file, 1, size - 1) != b"\n":
             os.write(self._file, b"\n")
-        self._synced = time.monotonic()
 
     def append(self, row: Row) -> None:
         """Write a row; it is there even if this process is killed right after.
@@ -122,24 +86,16 @@ class Journal:
         Raises:
             OSError: it could not be written whole, as on a full disk.
         """
-        line = checked_line(json.dumps(row, allow_nan=False).encode())
+        line = json.dumps(row, allow_nan=False).encode() + b"\n"
         written = os.write(self._file, line)
         if written != len(line):
             raise OSError(f"only {written} of {len(line)} bytes of a row could be written")
-        if time.monotonic() - self._synced > SYNC_S:
-            os.fsync(self._file)
-            self._synced = time.monotonic()
-
-    def close(self) -> None:
-        """Bring everything to the disk."""
-        os.fsync(self._file)
-        os.close(self._file)
 
     def __enter__(self) -> "Journal":
         return self
 
     def __exit__(self, *error: object) -> None:
-        self.close()
+        os.close(self._file)
 
 
 def _opened(path: Path) -> int:
@@ -172,37 +128,25 @@ def _lock(file: int, exclusive: bool) -> None:
         return
 
 
-@dataclass
-class Lines:
-    """Lines of a journal that is rewritten, each with its end.
-
-    Attributes:
-        lines: as they were read; whoever rewrites puts others in their place.
-    """
-
-    lines: list[bytes]
-
-
-@contextmanager
-def rewriting(path: Path) -> Iterator[Lines]:
-    """The lines of a journal, to be changed inside; the file is then replaced as a whole.
+def rewrite(path: Path, stays: Callable[[bytes], bool]) -> int:
+    """Keep only some lines of a journal, which is replaced as a whole; how many went.
 
     Raises:
         SuiteError: a run is appending to it.
     """
     file = os.open(path, os.O_RDONLY)
     try:
-        try:
-            _lock(file, exclusive=True)
-        except BlockingIOError:
-            raise SuiteError(
-                f"a run is writing to {path}; wait until it is done, or end it, and try again"
-            ) from None
-        lines = Lines(path.read_bytes().splitlines(keepends=True))
-        yield lines
-        replace_file(path, b"".join(lines.lines))
+        _lock(file, exclusive=True)
+        lines = path.read_bytes().splitlines(keepends=True)
+        kept = [line for line in lines if stays(line)]
+        replace_file(path, b"".join(kept))
+    except BlockingIOError:
+        raise SuiteError(
+            f"a run is writing to {path}; wait until it is done, or end it, and try again"
+        ) from None
     finally:
         os.close(file)
+    return len(lines) - len(kept)
 
 
 def read_rows(path: Path) -> Iterator[Row]:
@@ -212,15 +156,17 @@ def read_rows(path: Path) -> Iterator[Row]:
     and one line on standard error says so.
     """
     damaged: list[str] = []
-    for number, line in _lines(path):
+    for number, line in enumerate(_lines(path), start=1):
+        if not line.strip():
+            continue
         try:
-            row = parse_json(verified(line, number), f"line {number}", own=True)
+            row = parse_json(line, f"line {number}", own=True)
         except ValueError as error:
             damaged.append(str(error))
             continue
         if isinstance(row, dict):
             yield row
-        elif line.strip():
+        else:
             damaged.append(f"line {number} is no row")
     _say_damaged(path, damaged)
 
@@ -240,19 +186,12 @@ def case_rows(path: Path) -> Iterator[Row]:
     _say_damaged(path, damaged)
 
 
-def _lines(path: Path) -> Iterator[tuple[int, bytes]]:
-    """Lines of a file with their numbers; of one that is too long its beginning."""
-    if not path.is_file():
-        return
-    most, number = limit("document_kib") * 1024, 0
-    with path.open("rb") as file:
-        while line := file.readline(most):
-            number += 1
-            rest = line
-            while len(rest) == most and not rest.endswith(b"\n"):
-                rest = file.readline(most)
-            if line.strip():
-                yield number, line
+def _lines(path: Path) -> Iterator[bytes]:
+    """Lines of a file, none if it is not there; one that is too long comes in pieces."""
+    if path.is_file():
+        most = limit("document_kib") * 1024
+        with path.open("rb") as file:
+            yield from iter(lambda: file.readline(most), b"")
 
 
 def _say_damaged(path: Path, damaged: list[str]) -> None:

@@ -13,13 +13,13 @@ import gymnasium as gym
 
 from benchmarks.training import run
 from benchmarks.training.configuration.preset import PresetError
-from benchmarks.training.job import EXERCISE, ordered
 from benchmarks.training.policy_batch import PilotedVecEnv
 from benchmarks.training.policy_env import PilotedEnv
 from benchmarks.training.policy_export.product import policy_name, policy_of
 from benchmarks.training.reward import BROKEN_REWARD, LEAST_REWARD, bounded
 from benchmarks.training.run import Order, train
 from benchmarks.training.stations import Stations
+from benchmarks.training.train_policies import EXERCISE, ordered
 from benchmarks.training.validation import measure_of
 from controllers.policies.action_mapping import ActionMapping
 from controllers.policies.observation_spec import ObservationSpec

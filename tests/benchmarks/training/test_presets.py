@@ -21,10 +21,10 @@ from benchmarks.training.configuration.preset import (
 )
 from benchmarks.training.configuration.settings import network
 from benchmarks.training.environments import pressures_kpa
-from benchmarks.training.job import ordered
 from benchmarks.training.learner import learner
 from benchmarks.training.policy_env import PilotedEnv
 from benchmarks.training.policy_export.product import station_of
+from benchmarks.training.train_policies import ordered
 from controllers.policies.observation_spec import ObservationSpec
 from pma_gym.envs import ENVIRONMENTS
 

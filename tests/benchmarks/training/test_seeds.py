@@ -17,7 +17,7 @@ from benchmarks.__main__ import app
 from benchmarks.executors.choice import local
 from benchmarks.executors.executor import ThisProcess
 from benchmarks.executors.local import LocalProcesses
-from benchmarks.training import job
+from benchmarks.training import train_policies
 from benchmarks.training.run import Order
 
 
@@ -30,9 +30,9 @@ def weights(path):
 @pytest.mark.campaign
 def test_a_seed_has_the_same_policy_in_any_process(preset, tmp_path):
     order, console = Order(preset("ppo"), seed=3), Console(file=io.StringIO())
-    (here,) = job.run_seeds([(order, tmp_path / "here")], ThisProcess(), console)
+    (here,) = train_policies.run_seeds([(order, tmp_path / "here")], ThisProcess(), console)
     trainings = [(replace(order, seed=seed), tmp_path / f"seed-{seed}") for seed in (3, 4)]
-    third, fourth = job.run_seeds(trainings, local(2), console)
+    third, fourth = train_policies.run_seeds(trainings, local(2), console)
     assert third.parent.name == "seed-3" and fourth.parent.name == "seed-4"
     assert weights(third) == weights(here)
     assert weights(fourth) != weights(here)
@@ -43,7 +43,7 @@ def test_the_command_gives_every_seed_a_folder_and_the_executor_its_processes(
 ):
     asked = []
     monkeypatch.setattr(
-        job, "run_seeds", lambda trainings, places, _: asked.append((trainings, places))
+        train_policies, "run_seeds", lambda trainings, places, _: asked.append((trainings, places))
     )
     words = [
         "train",
