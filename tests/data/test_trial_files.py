@@ -299,7 +299,7 @@ def test_text_and_dates_in_a_spreadsheet_are_named(tmp_path):
     openpyxl = pytest.importorskip("openpyxl")
     for cell, shown in (
         ("wide", "'wide'"),
-        (datetime.datetime(2008, 1, 1), "datetime"),
+        (datetime.datetime(2008, 1, 1), "'2008-01-01 00:00:00'"),
         (True, "T"),
     ):
         book = openpyxl.Workbook()
