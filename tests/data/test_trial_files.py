@@ -12,6 +12,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from pma_gym.data.files import trial_files
 from pma_gym.data.files.trial_files import TrialWarning, place_in_file, read_trial, write_trial
+from pma_gym.data.readers import parquet
+from pma_gym.data.readers.table import Request
 from pma_gym.data.trial import COMMANDS, MEASUREMENTS, Trial, TrialError
 
 SUFFIXES = [".csv", ".parquet", ".xlsx"]
@@ -297,7 +299,7 @@ def test_text_and_dates_in_a_spreadsheet_are_named(tmp_path):
     openpyxl = pytest.importorskip("openpyxl")
     for cell, shown in (
         ("wide", "'wide'"),
-        (datetime.datetime(2008, 1, 1), "datetime"),
+        (datetime.datetime(2008, 1, 1), "'2008-01-01 00:00:00'"),
         (True, "T"),
     ):
         book = openpyxl.Workbook()
@@ -328,7 +330,7 @@ def test_a_missing_library_is_named_with_what_to_install(suffix, library, tmp_pa
     message = rf'{library}, which .* needs, is not installed: pip install "pma-gym\[files\]"'
     if suffix != ".xlsx":
         with pytest.raises(TrialError, match=message):
-            read_trial(path)
+            parquet.read(path.read_bytes(), path.name, Request())
     with pytest.raises(TrialError, match=message):
         write_trial(Trial([0.0], {"load_command": [0.0]}), path)
     assert path.read_text() == "x"

@@ -332,6 +332,19 @@ def test_one_process_reads_all_files_and_another_takes_its_place(tmp_path):
     assert reader() != first
 
 
+def test_a_system_that_limits_no_memory_is_said_once(tmp_path, monkeypatch):
+    savemat(tmp_path / "a.mat", COLUMNS)
+    receive = reader_process.receive_tables
+    monkeypatch.setattr(reader_process, "_READERS", {})
+    monkeypatch.setattr(
+        reader_process, "receive_tables", lambda stream: (receive(stream)[0], {"limited": False})
+    )
+    with pytest.warns(TrialWarning, match="this operating system sets a process no limit of mem"):
+        check(read_trial(tmp_path / "a.mat"))
+    check(read_trial(tmp_path / "a.mat"))
+    reader_process._end()
+
+
 @pytest.mark.skipif(not hasattr(signal, "SIGSTOP"), reason="stops a process as POSIX has it")
 def test_a_file_that_takes_too_long_is_refused(tmp_path, monkeypatch):
     savemat(tmp_path / "a.mat", COLUMNS)
