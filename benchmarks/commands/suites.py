@@ -1,4 +1,4 @@
-"""The commands about frozen suites: `run`, `report`, `add`, `remove` and `suites`."""
+"""The commands about frozen suites: `run`, `report`, `compare`, `add`, `remove`, `suites`."""
 
 import sys
 from pathlib import Path
@@ -26,6 +26,7 @@ def register(app: typer.Typer) -> None:
         epilog="Example: python -m benchmarks run --suite robust --controllers pid,mine.py:Mine"
     )(run)
     app.command(epilog="Example: python -m benchmarks report robust")(report)
+    app.command(epilog="Example: python -m benchmarks compare lqg pid")(compare)
     app.command(epilog="Example: python -m benchmarks add mine.py:Mine --suite hard")(add)
     app.command(epilog="Example: python -m benchmarks remove Mine --suite hard")(remove)
     app.command(epilog="Example: python -m benchmarks suites")(suites)
@@ -41,6 +42,10 @@ def run(
         Path | None, typer.Option(help="Folder of the results; results/SUITE if not given.")
     ] = None,
     executor: ExecutorOption = LOCAL,
+    stations: Annotated[
+        int | None, typer.Option(min=1, help="Only the first ones, for a quick look.")
+    ] = None,
+    task: Annotated[str, typer.Option(help="Only these tasks, by commas; all if empty.")] = "",
 ) -> None:
     """Compare controllers on a frozen suite; an interrupted run goes on where it stopped."""
     from benchmarks.comparison.job import chosen, run_comparison
@@ -57,11 +62,16 @@ def run(
         folder = out or RESULTS / frozen.name
         if isinstance(frozen, ReproductionSuite):
             specs = [entry.spec for entry in chosen(frozen, controllers)]
-            selected = frozen.select(controllers=specs)
+            if stations is not None:
+                raise SuiteError(
+                    f"suite {frozen.name} has models, no stations; leave --stations out"
+                )
+            selected = frozen.select(controllers=specs, tasks=listed(task))
             code = run_job(selected, folder, places, SafeConsole())
         else:
-            entries = chosen(frozen, controllers)
-            code = run_comparison(frozen, entries, folder, places, SafeConsole())
+            part = frozen.part(stations, listed(task))
+            entries = chosen(part, controllers)
+            code = run_comparison(part, entries, folder, places, SafeConsole())
     except (ControllerError, SuiteError) as error:
         refuse(error)
     except KeyboardInterrupt:
@@ -100,6 +110,26 @@ def report(
                 print(f"Not complete, so not in every column: {incomplete}")
                 print(f"Run the rest: {run_command(frozen, folder)}")
         print(f"Report: {page}")
+    except SuiteError as error:
+        refuse(error)
+
+
+def compare(
+    first: Annotated[
+        str, typer.Argument(help="Controller, folder of one, or FOLDER:CONTROLLER.", metavar="A")
+    ],
+    second: Annotated[str, typer.Argument(help="Another.", metavar="B")],
+    results: Annotated[
+        Path | None, typer.Option(help="Folder of the run; that of the last one if not given.")
+    ] = None,
+    task: Annotated[str, typer.Option(help="Only this task; all if empty.")] = "",
+) -> None:
+    """Say in one line which of two controllers is better, by how much, and if they differ."""
+    from benchmarks.comparison.compare import compare as compared
+    from benchmarks.suites.suite import SuiteError
+
+    try:
+        print(compared(first, second, results, task))
     except SuiteError as error:
         refuse(error)
 

@@ -11,6 +11,7 @@ from benchmarks.executors.executor import Executor
 from benchmarks.report.leaderboard import keep_bounds
 from benchmarks.runner.controller_spec import ControllerError, parse_controllers
 from benchmarks.runner.run import FAILED, INTERRUPTED, run_missing
+from benchmarks.suites.frozen import frozen_suite
 from benchmarks.suites.suite import Entry, FrozenSuite
 
 
@@ -41,7 +42,7 @@ def run_comparison(
     """Run what is missing of a suite and write its scores.
 
     Args:
-        suite: the suite.
+        suite: the suite, or a part of it.
         entries: controllers to run.
         out: folder of the results; made if need be.
         executor: where the cases run.
@@ -59,7 +60,7 @@ def run_comparison(
     print_scores(run.todo, entries, run.rows, console)
     try:
         with console.status("computing the achievable bounds that the leaderboard needs"):
-            keep_bounds(suite, out)
+            keep_bounds(frozen_suite(suite.source), out)
     except KeyboardInterrupt:
         console.print("Interrupted: all cases are done; the report computes the bounds.")
     console.print(f"Leaderboard: {report_command(suite, out)}", highlight=False)

@@ -60,19 +60,27 @@ class Leaderboard:
             wanted.append(pooled_measure(tasks))
         return {measure.name: self.standings_of(measure) for measure in wanted}
 
+    @property
+    def shown(self) -> list[Standings]:
+        """Standings with somebody in them; the last is of all tasks together, or the only one."""
+        return [each for each in self.standings.values() if each.errors.values.size]
+
     @cached_property
     def by_task(self) -> dict[str, Standings]:
         """Standings in every single task, phase III left out, where measures hold several."""
         if all(len(each.tasks) == 1 for each in measures(self.suite.tasks)):
             return {}
-        single = [Measure(t, (t,), task_of(t).schedule.unit) for t in self.suite.tasks]
-        standings = {measure.name: self.standings_of(measure) for measure in single}
+        standings = {task: self.standings_in(task) for task in self.suite.tasks}
         return {name: each for name, each in standings.items() if each.errors.values.size}
 
     def standings_of(self, measure: Measure) -> Standings:
         """Standings in a measure."""
         errors = self.record.errors(measure)
         return Standings(errors, self._failed(errors))
+
+    def standings_in(self, task: str) -> Standings:
+        """Standings in a single task, phase III left out."""
+        return self.standings_of(Measure(task, (task,), task_of(task).schedule.unit))
 
     def _failed(self, errors: Errors) -> tuple[int, ...]:
         rows = self.record.rows
@@ -109,8 +117,7 @@ class Leaderboard:
 
     def _repr_html_(self) -> str:
         """What a notebook shows: the standings in every measure."""
-        shown = [each for each in self.standings.values() if each.errors.values.size]
-        return notebook_html([standings_table(each, self.labels) for each in shown])
+        return notebook_html([standings_table(each, self.labels) for each in self.shown])
 
     @property
     def missing(self) -> list[Entry]:
@@ -126,24 +133,25 @@ class Leaderboard:
     @cached_property
     def obstacles(self) -> dict[tuple[str, float], str]:
         """Why the nominal actuator cannot follow, by task and pressure (kPa)."""
-        trials = dict.fromkeys((e.task, e.pressure_kpa) for e in self.suite.episodes)
+        every = [each.errors.episodes for each in self.shown]
+        trials = dict.fromkeys((e.task, e.pressure_kpa) for episodes in every for e in episodes)
         model = self.suite.nominal
         known = {(t, kpa): infeasibility_reason(task_of(t), model, 1e3 * kpa) for t, kpa in trials}
         return {trial: why for trial, why in known.items() if why is not None}
 
     @cached_property
     def loops(self) -> dict[str, list[Condition]]:
-        """Loops of the linear controllers, by task, at its lowest, middle and highest pressure."""
-        by_task = {}
+        """Loops of the linear controllers that ran, by task, at three of its pressures."""
+        by_task, ran = {}, {(name, episode.task) for name, episode in self.record.rows}
         for task in self.suite.tasks:
-            names = [e.spec.name for e in self.record.entries if e.does(task)]
+            names = [e.spec.name for e in self.record.entries if (e.spec.name, task) in ran]
             own = [CONTROLLERS[name]() for name in names if name in CONTROLLERS]
             if task in LOOP_TASKS and any(map(is_linear, own)):
                 by_task[task] = conditions(own, self._station_infos(task))
         return by_task
 
     def _station_infos(self, task: str) -> list[StationInfo]:
-        """What controllers receive at three pressures of a task."""
+        """What controllers receive at the lowest, middle and highest pressure of a task."""
         suite, environment = self.suite, self.suite.environment
         kpa = sorted({e.pressure_kpa for e in suite.episodes if e.task == task})
         delays = [environment.get(f"{name}_delay_s", 0.0) for name in ("action", "observation")]

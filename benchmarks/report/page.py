@@ -5,13 +5,14 @@ from benchmarks.report.interactive import case_figures
 from benchmarks.report.leaderboard import Leaderboard
 from benchmarks.report.loop_plots import loop_plot, loop_title, margin_table
 from benchmarks.report.plot_style import styles_of
-from benchmarks.report.plots import distribution_plot, improvement_plot, pressure_plot, profile_plot
+from benchmarks.report.plots import distribution_plot, pressure_plot, profile_plot
 from benchmarks.report.standings import Standings
 from benchmarks.report.tables import (
     capital,
     exercise_table,
     failure_table,
     obstacle_table,
+    pair_table,
     spending_table,
     standings_table,
     tasks_table,
@@ -25,7 +26,8 @@ _RANKS = (
     "1–3 means that these controllers cannot be told apart. Intervals come from 2000 resamples of "
     "what was drawn at random, stations or noise, the same for all controllers. “Over the best” "
     "compares two controllers on the same stations and so resolves far finer differences than "
-    "their two intervals. A failed case counts as an error of the whole range. "
+    "their two intervals; its interval holds for all pairs at once, as the ranks do. A failed case "
+    "counts as an error of the whole range. "
     "`docs/reference/score-definitions.md` defines every figure."
 )
 
@@ -49,14 +51,11 @@ def score_pictures(leaderboard: Leaderboard) -> dict[str, bytes]:
     """Every plot of the scores that there are figures for, as PNG by name."""
     styles = styles_of(leaderboard.labels)
     pictures: dict[str, bytes] = {}
-    single = shown_standings(leaderboard, pooled=False)
+    single = shown_standings(leaderboard)
     if single:
         pictures["distributions"] = distribution_plot(single, styles)
         pictures["profiles"] = profile_plot(single, styles)
         pictures["pressures"] = pressure_plot(single, styles)
-    headline = _headline(leaderboard)
-    if headline is not None and len(headline.errors.names) > 1:
-        pictures["improvement"] = improvement_plot(headline, styles)
     return pictures
 
 
@@ -114,43 +113,29 @@ def _notes(leaderboard: Leaderboard) -> list[str]:
     return notes
 
 
-def shown_standings(leaderboard: Leaderboard, pooled: bool) -> list[Standings]:
-    """Standings with somebody in them, with or without that of all tasks together."""
-    standings = [each for each in leaderboard.standings.values() if each.errors.values.size]
-    return (
-        standings if pooled else [each for each in standings if each.errors.measure.unit != PERCENT]
-    )
-
-
-def _headline(leaderboard: Leaderboard) -> Standings | None:
-    """The measure that all controllers are compared in: all tasks, or the only one."""
-    standings = shown_standings(leaderboard, pooled=True)
-    return standings[-1] if standings else None
+def shown_standings(leaderboard: Leaderboard) -> list[Standings]:
+    """Standings with somebody in them, but not that of all tasks together."""
+    return [each for each in leaderboard.shown if each.errors.measure.unit != PERCENT]
 
 
 def _ranking_blocks(leaderboard: Leaderboard) -> list[Block]:
     labels = leaderboard.labels
-    shown = shown_standings(leaderboard, pooled=True)
     # What pools all tasks stands first.
-    shown.sort(key=lambda each: each.errors.measure.unit != PERCENT)
+    shown = sorted(leaderboard.shown, key=lambda each: each.errors.measure.unit != PERCENT)
     blocks: list[Block] = [Heading("Ranking"), Paragraph(_RANKS)]
     blocks += [standings_table(each, labels) for each in shown]
     if leaderboard.by_task:
         blocks.append(tasks_table(leaderboard.by_task, labels))
-    headline = _headline(leaderboard)
-    if headline is not None and len(headline.errors.names) > 1:
+    if leaderboard.shown and len(leaderboard.shown[-1].rivals) > 1:
+        text = (
+            "Pairs of controllers on the same stations with the same noise. Two differ where 1 "
+            "lies outside their interval, which holds for all pairs at once; ranks say the same. "
+            "`pairs.csv` has every measure, and the bounds."
+        )
         blocks += [
-            Heading("Who beats whom", 3),
-            Paragraph(
-                "In how many of the cases the row's controller has the smaller error than the "
-                "column's, on the same station with the same noise: its probability of "
-                "improvement. `pairs.csv` has the intervals, and the same for every measure."
-            ),
-            Picture(
-                "improvement",
-                "Probability of improvement; bold where the row's interquartile mean is surely "
-                "the smaller, all pairs considered at once.",
-            ),
+            Heading("Who differs", 3),
+            Paragraph(text),
+            pair_table(leaderboard.shown[-1], labels),
         ]
     return blocks
 
@@ -165,7 +150,7 @@ def _obstacle_blocks(leaderboard: Leaderboard) -> list[Block]:
     return [
         Heading("References that cannot be followed", 3),
         Paragraph(text),
-        obstacle_table(leaderboard.obstacles, shown_standings(leaderboard, pooled=False)),
+        obstacle_table(leaderboard.obstacles, shown_standings(leaderboard)),
     ]
 
 
@@ -179,7 +164,7 @@ def _picture_blocks(leaderboard: Leaderboard) -> list[Block]:
             "higher and further left, the better. Bands: 95 % at each point.",
         ),
         Picture("pressures", "Median error by pressure, on a logarithmic scale."),
-        *case_figures(shown_standings(leaderboard, pooled=False), styles_of(leaderboard.labels)),
+        *case_figures(shown_standings(leaderboard), styles_of(leaderboard.labels)),
     ]
 
 
@@ -192,7 +177,7 @@ def _spending_blocks(leaderboard: Leaderboard) -> list[Block]:
         "often the 99th percentile of the computing time fits into a control period."
     )
     blocks: list[Block] = [Heading("What it costs"), Paragraph(text)]
-    for each in shown_standings(leaderboard, pooled=False):
+    for each in shown_standings(leaderboard):
         measure = each.errors.measure
         if not (measure.returning or measure.alone):
             names = [row.name for row in each.rows]
@@ -208,7 +193,7 @@ def _spending_blocks(leaderboard: Leaderboard) -> list[Block]:
 def _exercise_blocks(leaderboard: Leaderboard) -> list[Block]:
     """What exercises came to beside their errors."""
     blocks: list[Block] = []
-    for each in shown_standings(leaderboard, pooled=False):
+    for each in shown_standings(leaderboard):
         measure = each.errors.measure
         exercises = [task for task in measure.tasks if task_of(task).exercise]
         if exercises and not measure.alone:

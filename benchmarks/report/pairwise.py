@@ -1,7 +1,6 @@
 """Controllers against each other: who is better how often, by how much, and who may be ranked."""
 
 from dataclasses import dataclass
-from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
@@ -73,23 +72,27 @@ class Ranking:
 
     Attributes:
         ranks: of the controllers, in their order.
-        separated: whether the row's controller is better than the column's, shape (n, n).
-        critical: how many standard errors a difference must exceed, of all pairs at once.
+        ratios: figure of the row's controller over that of the column's, with the interval that
+            holds for all pairs at once, shape (n, n).
+        separated: whether the row's controller is better than the column's: its interval lies
+            below 1, shape (n, n).
     """
 
     ranks: tuple[Rank, ...]
+    ratios: tuple[tuple[Interval, ...], ...]
     separated: NDArray[np.bool_]
-    critical: float
 
 
 def ranking(estimates: ArrayLike, replicates: NDArray[np.float64], draws: Draws) -> Ranking:
-    """Ranks that hold together with 95 % confidence, however many controllers are compared.
+    """Ranks and pairwise intervals that hold together with 95 % confidence.
 
-    For every pair the logarithm of the ratio of their figures is compared with 0 by an interval of
-    `critical` standard errors; `critical` is the 95 % point of the largest standardised difference
-    among all pairs in the resamples (the max-t method), so that the chance of any false verdict is
-    5 %. A controller's best possible rank is one more than the number that are surely better, its
-    worst leaves only those that are surely worse behind it.
+    Every pair has one interval of the ratio of their figures, and differs where 1 lies outside.
+    Each side of it is `critical` standard errors of the logarithm long, by the deviations on that
+    side alone, for errors are skew. `critical` is the 95 % point of the largest standardised
+    deviation among all pairs in the resamples (the max-t method), so that the chance of any false
+    verdict is 5 %, however many controllers are compared. A controller's best possible rank is one
+    more than the number that are surely better, its worst leaves only those that are surely worse
+    behind it.
 
     Args:
         estimates: figure of every controller, the smaller the better.
@@ -99,34 +102,32 @@ def ranking(estimates: ArrayLike, replicates: NDArray[np.float64], draws: Draws)
         Mogstad, Romano, Shaikh and Wilhelm 2024, "Inference for Ranks" (Review of Economic Studies
         91), with the bootstrap of Romano and Wolf 2005 (Econometrica 73).
     """
-    means = np.asarray(estimates, dtype=np.float64)
+    means = np.log(np.maximum(np.asarray(estimates, dtype=np.float64), SMALLEST))
+    drawn = np.log(np.maximum(replicates, SMALLEST))
     number = len(means)
-    separated = np.zeros((number, number), dtype=bool)
-    pairs = list(combinations(range(number), 2))
-    critical = np.nan
-    if pairs and draws.known:
-        middle = np.log(np.maximum(means, SMALLEST))
-        drawn = np.log(np.maximum(replicates, SMALLEST))
-        first, second = np.transpose(pairs)
-        difference = middle[first] - middle[second]
-        spread = drawn[first] - drawn[second] - difference[:, None]
-        error = np.std(spread, axis=1)
-        # A ratio that no resample changes needs no margin, and has no standardised difference.
-        varies = error > _NO_SPREAD
-        critical = _critical(spread[varies], error[varies])
-        margin = np.where(varies, critical * draws.widening * error, _NO_SPREAD)
-        beyond = np.abs(difference) > margin
-        for (a, b), apart, gap in zip(pairs, beyond, difference, strict=True):
-            separated[a, b], separated[b, a] = apart and gap < 0.0, apart and gap > 0.0
+    middle = means[:, None] - means
+    first, second = np.triu_indices(number, 1)
+    deviation = drawn[first] - drawn[second] - middle[first, second][:, None]
+    sides = np.stack([np.maximum(-deviation, 0.0), np.maximum(deviation, 0.0)])
+    error = np.sqrt(2.0 * np.mean(sides**2, axis=-1))
+    reach = np.full((2, number, number), 0.0 if draws.known else np.nan)
+    reach[:, first, second] = _critical(sides, error) * draws.widening * error
+    reach[:, second, first] = reach[::-1, first, second]
+    low, high = middle - reach[0], middle + reach[1]
+    separated = high < -_NO_SPREAD
     ranks = tuple(
         Rank(1 + int(separated[:, i].sum()), number - int(separated[i].sum()))
         for i in range(number)
     )
-    return Ranking(ranks, separated, critical)
+    ends = np.exp(np.stack([middle, low, high], axis=-1)).tolist()
+    return Ranking(ranks, tuple(tuple(Interval(*pair) for pair in row) for row in ends), separated)
 
 
-def _critical(spread: NDArray[np.float64], error: NDArray[np.float64]) -> float:
-    if not len(error):
+def _critical(sides: NDArray[np.float64], error: NDArray[np.float64]) -> float:
+    """How many standard errors hold all deviations at once; shapes (2, pairs[, replicates])."""
+    # A ratio that no resample changes needs no margin, and has no standardised difference.
+    varies = error > _NO_SPREAD
+    if not varies.any():
         return 0.0
-    largest = np.max(np.abs(spread) / error[:, None], axis=0)
+    largest = np.max(sides[varies] / error[varies][:, None], axis=0)
     return float(np.quantile(largest, CONFIDENCE))

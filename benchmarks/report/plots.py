@@ -1,4 +1,4 @@
-"""The leaderboard's plots: distributions, profiles, error by pressure, pairwise comparison."""
+"""The leaderboard's plots: distributions, profiles, error by pressure."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -151,39 +151,6 @@ def pressure_plot(every: Sequence[Standings], styles: Styles) -> bytes:
             axis.set_ylabel(f"median RMSE ({errors.measure.unit})")
             axis.set_title(capital(errors.measure.name), loc="left")
         legend_below(canvas, _handles(every, styles), 4)
-        return png(canvas)
-
-
-def improvement_plot(standings: Standings, styles: Styles) -> bytes:
-    """Probability that the row's controller has the smaller error than the column's."""
-    names = [row.name for row in standings.rows]
-    places = {name: at for at, name in enumerate(names)}
-    shares = np.full((len(names), len(names)), np.nan)
-    for pair in standings.pairs:
-        shares[places[pair.first], places[pair.second]] = 100.0 * pair.improvement.estimate
-    side = 0.62 * len(names)
-    with picture(3.2 + side, 2.0 + side) as canvas:
-        axis: Any = canvas.subplots()
-        image = axis.imshow(shares, cmap="PuOr_r", vmin=0.0, vmax=100.0)
-        for pair in standings.pairs:
-            row, column = places[pair.first], places[pair.second]
-            share = shares[row, column]
-            axis.text(
-                column,
-                row,
-                f"{share:.0f}",
-                ha="center",
-                va="center",
-                fontsize=9,
-                fontweight="bold" if pair.separated else "normal",
-                color="white" if abs(share - 50.0) > 35.0 else "black",
-            )
-        labels = [styles[name].label for name in names]
-        axis.set_xticks(range(len(names)), labels, rotation=40, ha="right")
-        axis.set_yticks(range(len(names)), labels)
-        axis.grid(visible=False)
-        axis.set_title(f"{capital(standings.errors.measure.name)}: row better than column")
-        canvas.colorbar(image, ax=axis, label="cases (%)", shrink=0.75)
         return png(canvas)
 
 

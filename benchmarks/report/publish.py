@@ -16,7 +16,6 @@ from benchmarks.report.page import (
     loop_pictures,
     page_blocks,
     score_pictures,
-    shown_standings,
 )
 from benchmarks.report.standings import Pair
 from benchmarks.report.statistics import Interval
@@ -48,7 +47,7 @@ def run_report(suite: FrozenSuite, results: Path, out: Path) -> tuple[Path, Text
     with StepProgress() as progress:
         leaderboard = read_leaderboard(suite, results)
         page = write_leaderboard(leaderboard, out, progress)
-    ranks = ranks_table(shown_standings(leaderboard, pooled=True), leaderboard.labels)
+    ranks = ranks_table(leaderboard.shown, leaderboard.labels)
     return page, ranks, incomplete_counts(leaderboard)
 
 

@@ -32,7 +32,8 @@ class Standing(NamedTuple):
         worst: mean of the worst tenth of the cases (CVaR 10 %).
         percent: interquartile mean of the error in percent of its task's range.
         rank: places that it may hold; None for a bound.
-        to_best: its interquartile mean over that of the best rival.
+        to_best: its interquartile mean over that of the best rival; of a rival with the interval
+            that holds for all pairs at once, by which ranks are claimed.
         to_bound: over that of the bound; None if no bound ran.
         failures: how many of its cases failed.
     """
@@ -55,8 +56,9 @@ class Pair(NamedTuple):
         first: name of the one.
         second: name of the other.
         improvement: probability that the first one's error is the smaller.
-        ratio: interquartile mean of the first over that of the second.
-        separated: whether the first is better beyond doubt, all pairs considered at once.
+        ratio: interquartile mean of the first over that of the second; of two rivals with the
+            interval that holds for all pairs at once.
+        separated: whether the first is better beyond doubt: that interval lies below 1.
     """
 
     first: str
@@ -114,9 +116,29 @@ class Standings:
         return min(bounds, key=lambda at: (self.means[at], at), default=None)
 
     def ratio(self, first: int, second: int) -> Interval:
-        """Interquartile mean of one controller over another's, paired."""
+        """Interquartile mean of one controller over another's, paired; of this pair alone."""
         estimates = float(self.means[first]), float(self.means[second])
         return ratio(estimates, (self._resampled[first], self._resampled[second]), self.draws)
+
+    @cached_property
+    def _places(self) -> dict[int, int]:
+        """Places of the rivals in their ranking, by number."""
+        return {at: place for place, at in enumerate(self.rivals)}
+
+    def _joint_ratio(self, first: int, second: int) -> tuple[Interval, bool]:
+        """The ratio that ranks are claimed by, and whether the first is better beyond doubt."""
+        places = self._places
+        if first not in places or second not in places:
+            alone = self.ratio(first, second)
+            return alone, alone.high < 1.0
+        row, column = places[first], places[second]
+        return self.ranking.ratios[row][column], bool(self.ranking.separated[row, column])
+
+    def pair(self, first: int, second: int) -> Pair:
+        """One controller against another, by their numbers."""
+        names, values = self.errors.names, self.errors.values
+        wins = improvement(values[first], values[second], self.draws)
+        return Pair(names[first], names[second], wins, *self._joint_ratio(first, second))
 
     def _interval(self, at: int, statistic: Statistic) -> Interval:
         values = self.errors.values[at : at + 1]
@@ -138,15 +160,14 @@ class Standings:
     def _standing(self, at: int) -> Standing:
         measure, best, bound = self.errors.measure, self.best, self.bound
         scales = np.array([measure.percent(e.task) for e in self.errors.episodes])
-        ranks = dict(zip(self.rivals, self.ranking.ranks, strict=True))
         return Standing(
             name=self.errors.names[at],
             mean=self._interval(at, interquartile_mean),
             median=self._interval(at, median),
             worst=self._interval(at, worst_tenth),
             percent=float(interquartile_mean(self.errors.values[at] * scales)),
-            rank=ranks.get(at),
-            to_best=None if best is None else self.ratio(at, best),
+            rank=self.ranking.ranks[self._places[at]] if at in self._places else None,
+            to_best=None if best is None else self._joint_ratio(at, best)[0],
             to_bound=None if bound is None else self.ratio(at, bound),
             failures=self.failed[at],
         )
@@ -154,17 +175,4 @@ class Standings:
     @cached_property
     def pairs(self) -> list[Pair]:
         """Every controller against every other, rivals and bounds."""
-        places = {at: place for place, at in enumerate(self.rivals)}
-        pairs_ = []
-        for first, second in permutations(range(len(self.errors.names)), 2):
-            both = first in places and second in places
-            pairs_.append(
-                Pair(
-                    self.errors.names[first],
-                    self.errors.names[second],
-                    improvement(self.errors.values[first], self.errors.values[second], self.draws),
-                    self.ratio(first, second),
-                    both and bool(self.ranking.separated[places[first], places[second]]),
-                )
-            )
-        return pairs_
+        return [self.pair(*two) for two in permutations(range(len(self.errors.names)), 2)]

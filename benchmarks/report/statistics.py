@@ -115,7 +115,8 @@ def resample(
     A station that ran several cases is drawn with all of them, for they are no independent
     witnesses. It is exchanged for stations with cases in the same strata, so that every stratum
     keeps its number of cases. A unit with no like is exchanged for one that is like it on the next,
-    coarser level, at last for any with as many cases.
+    coarser level, at last for any with as many cases. Where one is left alone even so, all are
+    exchanged on the coarser level.
 
     Args:
         levels: stratum of every case, shape (cases,) each, from fine to coarse.
@@ -126,6 +127,9 @@ def resample(
     generator = np.random.default_rng(seed)
     drawn, spread = [], 0.0
     groups = _groups(levels, units)
+    while min(map(len, groups)) == 1 and levels:
+        levels = levels[1:]
+        groups = _groups(levels, units)
     for table in groups:
         members = generator.integers(len(table), size=(replicates, len(table)))
         drawn.append(table[members].reshape(replicates, -1))

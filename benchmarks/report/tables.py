@@ -1,6 +1,7 @@
 """The leaderboard's tables as text."""
 
 from collections.abc import Mapping, Sequence
+from itertools import combinations
 
 import numpy as np
 
@@ -75,6 +76,22 @@ def _standing_cells(row: Standing, labels: Labels, unit: str, bounded: bool) -> 
         *_ratio_cells(row.to_best),
     ]
     return cells + list(_ratio_cells(row.to_bound)) if bounded else cells
+
+
+def pair_table(standings: Standings, labels: Labels) -> TextTable:
+    """Every pair of rivals: by how much A, whose mean is smaller, is better; if they differ."""
+    names = [row.name for row in standings.rows if row.rank]
+    pairs = {(pair.first, pair.second): pair for pair in standings.pairs}
+    cases = len(standings.errors.episodes)
+    rows = []
+    for first, second in combinations(names, 2):
+        better, ratio = pairs[first, second], pairs[second, first].ratio
+        cells = [labels.get(first, first), labels.get(second, second), figure(ratio.estimate)]
+        cells += [ends(ratio), f"{better.improvement.estimate * cases:g} of {cases}"]
+        rows.append([*cells, "**yes**" if better.separated else "no"])
+    header = ["A", "B", "Error of B over that of A | ratio"]
+    header += ["Error of B over that of A | 95 % interval", "A's is smaller (cases)", "Differ"]
+    return TextTable(f"{capital(standings.errors.measure.name)}: pairs", header, rows, words=2)
 
 
 def _ratio_cells(ratio: Interval | None) -> tuple[str, str]:

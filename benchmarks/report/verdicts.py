@@ -161,7 +161,7 @@ def _of_all(target: Target, standings: Standings | None, labels: Mapping[str, st
     rivals = [row for row in standings.rows if row.rank is not None]
     best = rivals[0]
     if target.figure in ("half_width", "ratio_half_width"):
-        return _widest(target, rivals, what, labels)
+        return _widest(target, standings, rivals, what, labels)
     what = f"{what}: {labels.get(best.name, best.name)}"
     if target.figure == "best":
         return Verdict(what, target.most, best.mean)
@@ -169,15 +169,20 @@ def _of_all(target: Target, standings: Standings | None, labels: Mapping[str, st
 
 
 def _widest(
-    target: Target, rivals: Sequence[Standing], what: str, labels: Mapping[str, str]
+    target: Target,
+    standings: Standings,
+    rivals: Sequence[Standing],
+    what: str,
+    labels: Mapping[str, str],
 ) -> Verdict:
-    """The least sure of the rivals' figures, as a share of itself."""
+    """The least sure of the rivals' figures, as a share of itself; a ratio of its pair alone."""
+    at, best = standings.errors.names.index, rivals[0].name
 
     def width(row: Standing) -> float:
         if target.figure == "half_width":
             return row.mean.half_width
-        near = row.to_best is not None and row.to_best.estimate <= NEAR
-        return row.to_best.half_width if near and row.to_best else 0.0
+        ratio = standings.ratio(at(row.name), at(best))
+        return ratio.half_width if ratio.estimate <= NEAR else 0.0
 
     widest = max(rivals, key=width)
     got = Interval(100.0 * width(widest), np.nan, np.nan)

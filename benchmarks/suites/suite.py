@@ -1,8 +1,8 @@
 """Frozen suites: stations, episodes on them, compared controllers."""
 
 import hashlib
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Any, ClassVar, NamedTuple
@@ -111,6 +111,7 @@ class FrozenSuite:
         targets: what is asked of them.
         digest: of all numbers, controllers and targets apart.
         only_by_name: whether it is so long that it runs only where it is named.
+        only_tasks: tasks that are run; all if empty.
     """
 
     source: str
@@ -127,6 +128,7 @@ class FrozenSuite:
     targets: tuple[Target, ...]
     digest: str
     only_by_name: bool = False
+    only_tasks: tuple[str, ...] = ()
 
     keep_pace: ClassVar[bool] = True
     """Whether a controller from a file must on average answer within a control period."""
@@ -142,7 +144,25 @@ class FrozenSuite:
             for plan in self.episode_plans
             for task, pressure in plan.trials(at)
             for repeat in range(plan.repeats)
+            if task in self.tasks
         )
+
+    def part(self, stations: int | None = None, tasks: Sequence[str] = ()) -> "FrozenSuite":
+        """Its first stations and some tasks, for a quick look: the very episodes of the whole.
+
+        Raises:
+            SuiteError: so many stations or such a task it does not have.
+        """
+        if stations is not None and stations > len(self.stations):
+            raise SuiteError(
+                f"suite {self.name} has {len(self.stations)} stations, got --stations {stations}"
+            )
+        for task in tasks:
+            if task not in self.tasks:
+                raise SuiteError(
+                    f"suite {self.name} has the tasks {', '.join(self.tasks)}, got --task {task}"
+                )
+        return replace(self, stations=self.stations[:stations], only_tasks=tuple(tasks))
 
     @property
     def control_rate_hz(self) -> float:
@@ -152,7 +172,8 @@ class FrozenSuite:
     @property
     def tasks(self) -> tuple[str, ...]:
         """Names of its tasks."""
-        return tuple(dict.fromkeys(task for plan in self.episode_plans for task in plan.tasks))
+        every = dict.fromkeys(task for plan in self.episode_plans for task in plan.tasks)
+        return tuple(task for task in every if task in self.only_tasks or not self.only_tasks)
 
     def runs(self, entry: Entry, episode: Episode) -> bool:
         """Return whether a controller of the suite runs an episode."""

@@ -15,6 +15,7 @@ from rich.console import Console
 from typer.testing import CliRunner
 
 from benchmarks.__main__ import app
+from benchmarks.comparison.compare import compare
 from benchmarks.comparison.job import chosen, run_comparison
 from benchmarks.comparison.scores import SCORES, TIMES
 from benchmarks.executors.choice import ExecutorName, executor_named
@@ -26,6 +27,7 @@ from benchmarks.runner.execution import execute, pending_cases
 from benchmarks.runner.journal import JOURNAL, Journal, read_rows
 from benchmarks.runner.provenance import finished_rows, read_run
 from benchmarks.suites.frozen import frozen_suite
+from benchmarks.suites.suite import SuiteError
 
 ONE = ThisProcess()
 ROOT = Path(__file__).parents[3]
@@ -272,6 +274,35 @@ def test_bad_input_is_one_message_and_exit_code_2(options, message, tmp_path):
     done = CliRunner().invoke(app, ["run", *(text.format(tmp_path) for text in options)])
     assert done.exit_code == 2 and done.stdout == ""
     assert message in done.stderr and done.stderr.count("\n") == 1
+
+
+def test_a_quick_look_is_a_part_of_the_whole_and_says_who_is_better(tmp_path):
+    path, out, other = tmp_path / "six.toml", tmp_path / "out", tmp_path / "other"
+    path.write_text(SUITE.replace("count = 2\nnominal = true", "count = 6"))
+    suite = frozen_suite(str(path))
+    quick = suite.part(5, ["displacement"])
+    assert run(quick, "pid,improved_feedforward", out)[0] == 0
+    line = compare("improved_feedforward", "pid", out)
+    assert line.startswith("PID is better than improved_feedforward: the error of improved_feed")
+    assert line.endswith("PID has the smaller one in 10 of 10 cases of displacement")
+    assert run(quick, "improved_feedforward", other)[0] == 0
+    assert line == compare(f"{out}:pid", str(other), task="displacement").replace(
+        f" of {out}", ""
+    ).replace(f" of {other}", "")
+    # The whole goes on from the part; compared is what both ran.
+    code, words = run(suite, "pid", out)
+    assert code == 0 and "10 cases are done" in words
+    assert compare("pid", "improved_feedforward", out) == line
+    for sides, message in {
+        ("pid", "mpc"): "has no results of mpc; it has pid, improved_feedforward",
+        ("pid", str(out)): f"has pid, improved_feedforward; name one as {out}:pid",
+    }.items():
+        with pytest.raises(SuiteError, match=message):
+            compare(*sides, out)
+    with pytest.raises(SuiteError, match="has 6 stations, got --stations 7"):
+        suite.part(7)
+    with pytest.raises(SuiteError, match="has the tasks displacement, got --task rotation"):
+        suite.part(tasks=["rotation"])
 
 
 def test_suites_lists_what_can_be_run():

@@ -171,7 +171,10 @@ from tests.benchmarks.executors.pieces import sleeps
 if __name__ == "__main__":
     folder = Path(sys.argv[1])
     works = [partial(sleeps, folder, index, 600.0) for index in range(2)]
-    run_all(works, executor_named(ExecutorName(sys.argv[2]), 2), lambda index, result: None)
+    try:
+        run_all(works, executor_named(ExecutorName(sys.argv[2]), 2), lambda *result: print(result))
+    except OSError as error:
+        print(error)
 """
 
 
@@ -182,6 +185,45 @@ def is_alive(pid):
     except OSError:
         return False
     return state not in "ZX"
+
+
+def parent_of(pid):
+    return int(Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[1])
+
+
+def children(pid):
+    every = [int(path.name) for path in Path("/proc").glob("[0-9]*")]
+    return [each for each in every if is_alive(each) and parent_of(each) == pid]
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")
+@pytest.mark.campaign
+@pytest.mark.parametrize("part", ["gcs_server", "raylet"])
+def test_a_ray_cluster_that_is_lost_is_said_to_be(tmp_path, part):
+    pytest.importorskip("ray")
+    script = tmp_path / "script.py"
+    script.write_text(ORPHANS.replace("600.0", "12.0").replace("range(2)", "range(4)"))
+    environment = {k: v for k, v in os.environ.items() if k != "RAY_ADDRESS"}
+    with subprocess.Popen(
+        [sys.executable, str(script), str(tmp_path), ExecutorName.RAY],
+        env=environment | {"PYTHONPATH": str(ROOT)},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        text=True,
+    ) as driver:
+        deadline = time.monotonic() + 120
+        while len(list(tmp_path.glob("*.pid"))) < 2 and time.monotonic() < deadline:
+            time.sleep(0.05)
+        (node,) = (
+            pid
+            for pid in children(driver.pid)
+            if Path(f"/proc/{pid}/comm").read_text().strip() == part
+        )
+        os.kill(node, signal.SIGKILL)
+        output, _ = driver.communicate(timeout=60)
+    # No piece is blamed.
+    assert "ProcessDied" not in output
+    assert "is lost; what is done stays: start the cluster again" in output
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")
@@ -213,6 +255,10 @@ def test_no_worker_outlives_its_parent_by_two_seconds(tmp_path, how, name):
             texts = [path.read_text() for path in tmp_path.glob("*.pid")]
             workers = [int(text) for text in texts if text]
         assert len(workers) == 2 and all(map(is_alive, workers))
+        if name is ExecutorName.RAY:
+            # Ray's agents beside them too.
+            workers = children(parent_of(workers[0]))
+            assert len(workers) >= 4
         parent.send_signal(how)
         parent.wait(30)
     ended = time.monotonic()

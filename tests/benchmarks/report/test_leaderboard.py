@@ -158,6 +158,17 @@ def test_an_interrupted_run_compares_the_cases_that_all_have():
     assert [check.word for check in ranking.verdicts] == ["no figure"]
 
 
+def test_margins_and_bode_plots_are_of_what_ran():
+    suite = simulated_suite()
+    ran = [r for r in simulated_rows(suite) if r["controller"] == "pid" and r["task"] == "rotation"]
+    ranking = board(suite, ran)
+    assert list(ranking.loops) == ["rotation"]
+    for condition in ranking.loops["rotation"]:
+        assert {loop.name for loop in condition.everywhere} == {"pid"}
+    text = to_markdown(page_blocks(ranking), {}, "plots")
+    assert "Displacement: least margins" not in text and "Who differs" not in text
+
+
 def test_rows_of_other_versions_and_unknown_episodes_do_not_count():
     suite = simulated_suite()
     rows = simulated_rows(suite)
@@ -275,12 +286,12 @@ def test_page_and_numbers_are_written(folder, tmp_path, monkeypatch):
     column = ranks.header.index("Displacement (mm)")
     assert {row[column].partition(" [")[2] for row in ranks.rows} >= {"bound]"}
     written = {p.name: p.read_bytes() for p in out.rglob("*") if p.is_file()}
-    names = {"distributions.png", "profiles.png", "pressures.png", "improvement.png"}
+    names = {"distributions.png", "profiles.png", "pressures.png"}
     assert names <= set(written)
     assert {"loops_displacement.png", "loops_rotation.png", NUMBERS, PAIRS, TEXT} <= set(written)
     page = written[PAGE].decode()
     assert 'src="http' not in page
-    assert page.count("data:image/png;base64") == 6
+    assert page.count("data:image/png;base64") == 5
     assert "it broke" in page
     assert "digest abc, changed since" in page
     rows = list(csv.DictReader(written[NUMBERS].decode().splitlines()))

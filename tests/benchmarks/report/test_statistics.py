@@ -1,5 +1,7 @@
 """The statistics of a comparison: against hand-computed figures and known distributions."""
 
+from itertools import permutations
+
 import numpy as np
 import pytest
 
@@ -53,6 +55,13 @@ def test_a_unit_without_like_is_exchanged_on_the_coarser_level():
     assert draws.known
     assert all(np.sum(coarse[row] == 0) == 3 for row in draws.cases)
     assert set(draws.cases.ravel()) == set(range(6))
+
+
+def test_one_that_is_left_alone_is_exchanged_with_all():
+    # Two stations in stratum 0, two in 1 and one in 2, which has no like.
+    draws = resample([np.array([0, 0, 1, 1, 2])], np.arange(5), 300)
+    assert draws.known
+    assert set(draws.cases[:, 0]) == set(range(5))
 
 
 def test_one_case_alone_has_no_interval():
@@ -137,11 +146,28 @@ def ranked(values, draws):
     return ranking(means, replicated(values, draws, interquartile_mean), draws)
 
 
-def test_equal_controllers_are_seldom_ranked_apart():
-    generator, draws = np.random.default_rng(5), apart(60)
-    wrong = sum(ranked(simulated(generator, 1.0), draws).separated.any() for _ in range(120))
-    # At 5 % for all 15 pairs together, more than 13 in 120 has a chance of 1 in 100.
+@pytest.mark.parametrize(("cases", "controllers"), [(60, 6), (6, 4), (6, 2)])
+def test_equal_controllers_are_seldom_ranked_apart(cases, controllers):
+    generator, draws = np.random.default_rng(5), apart(cases)
+    values = (simulated(generator, 1.0, controllers, cases) for _ in range(120))
+    wrong = sum(ranked(each, draws).separated.any() for each in values)
+    # At 5 % for all pairs together, more than 13 in 120 has a chance of 1 in 100.
     assert wrong <= 13
+
+
+def test_intervals_of_pairs_and_ranks_never_contradict_each_other():
+    generator, draws, differ = np.random.default_rng(7), apart(6), 0
+    for shift in np.linspace(0.3, 1.0, 40):
+        each = ranked(simulated(generator, shift, 4, 6), draws)
+        for a, b in permutations(range(4), 2):
+            there, back = each.ratios[a][b], each.ratios[b][a]
+            assert each.separated[a, b] == (there.high < 1.0) == (back.low > 1.0)
+            assert there.low <= there.estimate <= there.high
+            assert not each.separated[a, b] or each.ranks[a].best < each.ranks[b].worst
+            differ += there.high < 1.0
+        for at, rank in enumerate(each.ranks):
+            assert rank.best == 1 + each.separated[:, at].sum()
+    assert 20 < differ < 120
 
 
 def test_a_better_controller_is_ranked_first_and_the_rest_share_the_others():
