@@ -19,7 +19,7 @@ from controllers.models.voltage import VOLTAGE_LIMIT
 from pma_gym.data.signals import SIGNALS, is_pressure
 from pma_gym.engine.nominal_rig import motor_at_rest
 from pma_gym.envs import StationInfo
-from pma_gym.plant.forms.linear import FOLLOWING
+from pma_gym.plant.forms.linear import following
 from pma_gym.plant.plant import Plant
 from pma_gym.plant.rigs import RIGS
 
@@ -155,7 +155,7 @@ def _kept(plant: Plant) -> list[int]:
     return [
         i
         for i, name in enumerate(plant.states)
-        if (not name.startswith("memory_") or name in FOLLOWING) and name != "lag_load_cell"
+        if (not name.startswith("memory_") or name in following(plant)) and name != "lag_load_cell"
     ]
 
 

@@ -3,13 +3,11 @@
 The station (`pma_gym.plant.rigs.station`) computes its signals one after the other, and its
 equilibrium without the cable. A law therefore has access to the signals that are known at its port.
 Rates of states come last and have access to all signals. `tests/effects/test_user_effects.py`
-checks this table against the station.
+checks this table against the station; `pma_gym.effects.rig_ports` has those of the other rigs.
 """
 
 import math
 from dataclasses import dataclass
-
-from pma_gym.effects.sensors.sensors import SENSORS
 
 STATES = ("contraction", "velocity", "angle", "spin", "pressure")
 
@@ -22,6 +20,9 @@ EVERYTHING = (
 
 _RANGES = {
     "contraction": 0.03,
+    "position": 0.03,
+    "drive_force": 5.0,
+    "carried_force": 3.0,
     "velocity": 0.1,
     "angle": 1.0,
     "motor_angle": -0.5,
@@ -73,7 +74,6 @@ class Port:
 _MUSCLE = ("pressure", "contraction", "velocity")
 _DAMPING = (*_MUSCLE, "cable_tension")
 _RIPPLE = ("load_arriving", "angle", "motor_angle", "spin", "velocity", "motor_voltage")
-_SENSOR = ("signal", "contraction", "velocity", "angle", "spin", "pressure", "cable_tension")
 
 STATION_PORTS: dict[str, Port] = {
     "muscle_force": Port(
@@ -132,17 +132,6 @@ STATION_PORTS: dict[str, Port] = {
 
 SENSOR, SENSOR_DELAY = "sensor:", "sensor_delay:"
 """Prefixes, before an output's name, of the ports of a sensor's errors and lag and of its delay."""
-
-SENSOR_PORTS: dict[str, Port] = {
-    f"{SENSOR}{output}": Port("reading on top of the truth, added", signals=_SENSOR, absent=0.0)
-    for output in (sensor.port.removeprefix(SENSOR) for sensor in SENSORS)
-}
-"""Ports of the sensors, the same for every rig."""
-
-OPEN_PORTS: dict[str, Port] = {
-    name: port for name, port in (STATION_PORTS | SENSOR_PORTS).items() if port.absent is not None
-}
-"""Ports where users can add effects."""
 
 
 def example(signal: str) -> float:

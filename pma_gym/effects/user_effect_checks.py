@@ -11,7 +11,8 @@ import numpy as np
 from pma_gym.codegen.graph import CHANGING, FIXED, Graph
 from pma_gym.codegen.trace import trace
 from pma_gym.effects.effect import Effect, signals
-from pma_gym.effects.ports import EVERYTHING, OPEN_PORTS, STATES, example
+from pma_gym.effects.ports import example
+from pma_gym.effects.rig_ports import OPEN_PORTS, rigs_of, unknown_signal
 from pma_gym.units import with_unit
 
 
@@ -30,9 +31,10 @@ def numbers(law: Callable) -> Iterator[tuple[str, object]]:
 
 
 def _port(effect: Effect, _module: ModuleType) -> str:
-    if effect.port in OPEN_PORTS:
+    if rigs_of(effect.port):
         return ""
-    return f"acts at port {effect.port!r}; effects can be added at {', '.join(OPEN_PORTS)}"
+    ports = "; ".join(f"of a {rig}: {', '.join(ports)}" for rig, ports in OPEN_PORTS.items())
+    return f"acts at port {effect.port!r}; effects can be added at ports {ports}"
 
 
 def _parameters(effect: Effect, _module: ModuleType) -> str:
@@ -85,24 +87,9 @@ def _functions(effect: Effect, module: ModuleType) -> str:
 
 
 def _arguments(effect: Effect, _module: ModuleType) -> str:
-    memory = ("memory",) if effect.rate or effect.rate_independent_law else ()
-    place, path = OPEN_PORTS[effect.port].signals, ("memory", "travel", "direction")
-    known = [
-        (effect.law, (*place, *memory)),
-        (effect.rate, (*EVERYTHING, "memory")),
-        (effect.rate_independent_law, path),
-        (effect.path_breakpoint, ("memory", "direction")),
-        (effect.event, (*STATES, "stretch")),
-        (effect.breakpoint, (*STATES, "stretch")),
-    ]
-    for law, names in known:
-        unknown = [name for name in signals(law) if name not in (*names, "p")] if law else []
-        if law and unknown:
-            return (
-                f"has {law.__name__}({', '.join(signals(law))}); it cannot know "
-                f"{', '.join(unknown)}; at port {effect.port} it may take {', '.join(names)} and p"
-            )
-    return ""
+    """A law must suit one of the rigs that have its port; a model checks its own."""
+    unknown = [unknown_signal(effect, rig) for rig in rigs_of(effect.port)]
+    return unknown[0] if all(unknown) else ""
 
 
 def _arithmetic(effect: Effect, _module: ModuleType) -> str:
@@ -144,7 +131,7 @@ def _memories(effect: Effect, make: Callable) -> object:
 
 
 def _absence(effect: Effect, _module: ModuleType) -> str:
-    law, absent = effect.law, OPEN_PORTS[effect.port].absent
+    law, absent = effect.law, OPEN_PORTS[rigs_of(effect.port)[0]][effect.port].absent
     assert law is not None
     for share in (1.0, -0.5):
         known = {name: share * example(name) for name in signals(law)}

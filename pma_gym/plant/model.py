@@ -15,11 +15,13 @@ from pma_gym.documents import DocumentError, read_toml
 from pma_gym.effects import CATALOGUE, Effect
 from pma_gym.effects.effect import Parameters, Value
 from pma_gym.effects.ports import SENSOR_DELAY, Port, measured_output
+from pma_gym.effects.rig_ports import unknown_signal
 from pma_gym.effects.user_effects import (
     EFFECTS_FROM,
     HEAD,
     how_to_load,
     load_named_effects,
+    source_of,
     sources_of,
 )
 from pma_gym.limits import LimitError
@@ -392,6 +394,8 @@ def _check_ports(model: Model) -> None:
                 f"[{name}] acts at port {effect.port}, which a {rig.name} does not have; "
                 f"its ports: {', '.join(rig.ports)}"
             )
+        if source_of(name) and (wrong := unknown_signal(effect, rig.name)):
+            raise ModelError(f"[{name}] {wrong}")
         _check_sensor(model, effect)
         if name in rig.refused_effects:
             raise ModelError(f"a {rig.name} cannot have [{name}]: {rig.refused_effects[name]}")

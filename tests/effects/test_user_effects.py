@@ -19,17 +19,21 @@ from benchmarks.executors.local import LocalProcesses
 from pma_gym.codegen.trace import live_inputs
 from pma_gym.data.trial import Trial
 from pma_gym.discovery.fitting.journal import digest
+from pma_gym.discovery.screening.candidates import candidate_effects
 from pma_gym.effects import CATALOGUE, Effect, user_effects
-from pma_gym.effects.ports import EVERYTHING, OPEN_PORTS, SENSOR_PORTS, STATION_PORTS
+from pma_gym.effects.ports import measured_output
+from pma_gym.effects.rig_ports import OPEN_PORTS, RATE_SIGNALS
 from pma_gym.effects.user_effects import OwnEffectError, load_effects, source_of
 from pma_gym.envs import PMAEnv
+from pma_gym.estimation.fitting import fit
 from pma_gym.integrator.equations import COMMANDS, ZERO
 from pma_gym.plant.composition import PlantEquations
 from pma_gym.plant.model import ModelError, dump_model, load_model
 from pma_gym.plant.plant import Plant
 from pma_gym.plant.program import structure
-from pma_gym.plant.rigs.station import write_equations
 from pma_gym.plant.statics import muscle_force
+from tests.plant.test_joint import joint
+from tests.plant.test_rigs import FIRST, MODELS
 
 HEAD = """
 from typing import Annotated, NamedTuple
@@ -182,9 +186,12 @@ BROKEN = {
     "word": (broken('"drag"', '"my drag"'), r"needs a name of letters, digits and _"),
     "port": (
         broken("slide_force", "muscle"),
-        r"acts at port 'muscle'; effects can be added at mus",
+        r"acts at port 'muscle'; effects .* ports of a station: mus",
     ),
-    "replaced": (broken("slide_force", "cable"), r"acts at port 'cable'; effects can be added at"),
+    "replaced": (
+        broken("slide_force", "cable"),
+        r"acts at port 'cable'; effects can be added at .* of a joint: drive",
+    ),
     "signal": (
         broken("drag(velocity, p)", "drag(velocity, load, p)"),
         r"cannot know load; at port",
@@ -259,32 +266,37 @@ BRANCH = Effect("branch", "{port}", Branch, law, rate=rate)
 )
 
 
-@pytest.mark.parametrize("port", OPEN_PORTS)
-def test_laws_may_know_what_the_table_says(port, write, station):
-    """Every signal at every port is one that the station has when it gets there."""
-    assert port in STATION_PORTS or port in SENSOR_PORTS
-    place = OPEN_PORTS[port]
+@pytest.mark.parametrize(
+    ("rig", "port"), [(r, p) for r, ports in OPEN_PORTS.items() for p in ports]
+)
+def test_laws_may_know_what_the_table_says(rig, port, write):
+    """Every signal at every port is one that the rig has when it gets there."""
+    place, bare = OPEN_PORTS[rig][port], load_model(MODELS[rig])
+    assert port in bare.rig.ports or measured_output(port) in bare.rig.outputs
     known = {
         "signals": "".join(f"{name}, " for name in place.signals),
         "absent": place.absent if isinstance(place.absent, str) else f"{place.absent!r}",
-        "everything": ", ".join(EVERYTHING),
-        "sum": " + ".join(EVERYTHING),
+        "everything": ", ".join(RATE_SIGNALS[rig]),
+        "sum": " + ".join(RATE_SIGNALS[rig]),
         "port": port,
     }
     if isinstance(place.absent, float):
         used = " + ".join(f"0.0 * {name}" for name in place.signals)
         known["absent"] = f"{place.absent!r} + ({used})"
     (effect,) = load_effects(write(MEMORY.format(**known)))
-    model = station.model.with_effects({"branch": {}})
+    model = bare.with_effects({"branch": {}})
     equations = PlantEquations(model.effects, model.parameters)
-    write_equations(equations)
+    model.rig.write_equations(equations)
     states = {entry.name for entry in equations.remembered}
     inputs = live_inputs([state.rate for state in equations.states])
     inner = {"origin", "direction"}
     plain = {v.data for v in inputs if "." not in v.data}
     assert plain <= states | set(COMMANDS) | inner | {ZERO}
-    assert set(effect.memory_names) <= states
-    assert np.all(np.isfinite(Plant(model).settle(2.0, 300e3).state))
+    has_sensor = any(e.port == port and not e.law for e in model.effects.values())
+    if not measured_output(port) or has_sensor:
+        assert set(effect.memory_names) <= states
+    measured = Plant(model).simulate(FIRST[rig], noise=False).measurements
+    assert all(np.isfinite(values).all() for values in measured.values())
 
 
 def test_an_effect_with_a_memory_settles_and_runs(write, station):
@@ -392,3 +404,74 @@ def test_the_variable_names_files_of_which_one_may_be_wrong(write, monkeypatch):
 def test_a_file_whose_path_the_variable_cannot_have_is_refused(tmp_path):
     with pytest.raises(OwnEffectError, match=r"in its path, which separates .*; rename it"):
         load_effects(tmp_path / f"my{os.pathsep}effects.py")
+
+
+AXIS = (
+    HEAD
+    + """
+import numpy as np
+
+class Size(NamedTuple):
+    size: Annotated[float, Quantity("{unit}", 0, 100, "assumption", 0.0, usual={usual})]
+
+def law({signals}, p):
+    return {law}
+
+OWN = Effect("own", "{port}", Size, law, signature="own")
+"""
+)
+TIME = np.linspace(0.0, 1.0, 201)
+WAVE = np.sin(5.0 * TIME + 8.0 * TIME**2)
+DRIVEN = {
+    "slide": (MODELS["slide"], {"load_command": 20.0 * WAVE}),
+    "joint": (
+        joint(True, encoder={"bandwidth_hz": 1000.0, "noise_deg": 0.01}),
+        {"torque_command": 0.1 * WAVE},
+    ),
+}
+"""A model of a rig with a sensor, and commands that move it."""
+
+
+@pytest.mark.parametrize(
+    ("rig", "port", "unit", "usual", "signals", "law"),
+    [
+        ("slide", "slide_force", "N", 4.0, "velocity", "-p.size * np.tanh(velocity / 0.01)"),
+        ("slide", "contact_force", "N", 9.0, "velocity", "-p.size * np.sin(velocity)"),
+        ("slide", "muscle_damping", "N s/mm", 0.2, "velocity", "p.size * abs(velocity) ** (2 / 3)"),
+        ("slide", "drive_gain", "1", 0.1, "drive_force", "p.size * drive_force"),
+        (
+            *("slide", "drive_loss", "1", 0.1, "drive_force, velocity"),
+            "-p.size * np.abs(drive_force) * np.tanh(velocity / 0.01)",
+        ),
+        (
+            *("slide", "drive_lag", "1", 0.2, "load_command"),
+            "load_command * (1.0 - p.size * np.tanh(load_command / 10.0) ** 2)",
+        ),
+        ("joint", "joint_torque", "N m", 0.02, "spin", "-p.size * np.tanh(spin / 0.05)"),
+        ("joint", "joint_load", "N m", 0.2, "position", "-p.size * position**3"),
+        ("joint", "drive_gain", "1", 0.1, "drive_force", "p.size * drive_force**3 * 50.0"),
+        (
+            *("joint", "joint_drive_loss", "1", 0.1, "drive_force, carried_force, spin"),
+            "-p.size * np.sqrt(drive_force**2 + 1e-6) * np.tanh(spin / 0.05)",
+        ),
+        ("joint", "drive_lag", "1", 0.2, "load_command", "load_command * (1.0 - p.size)"),
+    ],
+)
+def test_the_size_of_a_law_on_an_axis_is_fitted(rig, port, unit, usual, signals, law, write):
+    """Friction, springs and drives of a user on slides and joints: simulated, then found again."""
+    text = AXIS.format(unit=unit, usual=usual, signals=signals, law=law, port=port)
+    (effect,) = load_effects(write(text))
+    bare, commands = load_model(DRIVEN[rig][0]), DRIVEN[rig][1]
+    (path,) = [f"own.{name}" for name in effect.names_in_files()]
+    truth = bare.with_effects({"own": {path[4:]: usual}})
+    trial = Plant(truth).simulate(Trial(TIME, commands), seed=1)
+    fitted = fit(truth.replace({path: 1.5 * usual}), [trial], [path])
+    assert fitted.model.values_in_files("own")[path[4:]] == pytest.approx(usual, rel=0.05)
+    assert "own" in {each.effect for each in candidate_effects(bare)}
+
+
+def test_a_law_is_refused_on_a_rig_without_its_signals(write, station):
+    load_effects(write(DRAG.replace("drag(velocity", "drag(contraction, velocity")))
+    station.model.with_effects(["drag"])
+    with pytest.raises(ModelError, match=r"cannot know contraction; at port slide_force of a sl"):
+        load_model(MODELS["slide"]).with_effects(["drag"])

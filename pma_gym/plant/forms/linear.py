@@ -5,7 +5,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pma_gym.data.signals import is_pressure
-from pma_gym.effects import CATALOGUE
 from pma_gym.plant.compiled_model import CompiledModel
 from pma_gym.plant.condition import Condition
 from pma_gym.plant.equilibrium.force_balance import static_force
@@ -17,14 +16,6 @@ if TYPE_CHECKING:
 INPUTS = ("motor_voltage", "regulator_voltage")
 DIRECTIONS = {"contracting": 1.0, "relaxing": -1.0}
 """Sign of the velocity by direction of motion."""
-
-FOLLOWING = tuple(
-    name
-    for effect in CATALOGUE.values()
-    if effect.port in ("drive_delay", "drive_lag", "regulator_delay")
-    for name in effect.memory_names
-)
-"""States of effects that follow a command within milliseconds and are part of the linear system."""
 
 _STEP, _PRESSURE_STEP, _VOLTAGE_STEP = 1e-7, 100.0, 1e-4
 """Steps of the central differences: m, rad or their rates; Pa; V."""
@@ -85,7 +76,7 @@ def linearize_at(
     kept = [
         i
         for i, name in enumerate(plant.states)
-        if name in FOLLOWING or not name.startswith(("memory_", "lag_"))
+        if name in following(plant) or not name.startswith(("memory_", "lag_"))
     ]
     seen = _seen(plant)
     return control.StateSpace(
@@ -97,6 +88,16 @@ def linearize_at(
         inputs=list(INPUTS),
         outputs=list(seen),
         name=plant.model.name,
+    )
+
+
+def following(plant: CompiledModel) -> tuple[str, ...]:
+    """States that follow a command within milliseconds and are part of the linear system."""
+    return tuple(
+        name
+        for effect in plant.effects.values()
+        if effect.port in ("drive_delay", "drive_lag", "regulator_delay")
+        for name in effect.memory_names
     )
 
 

@@ -104,7 +104,7 @@ def write_equations(equations: PlantEquations) -> None:
     eq.add_state("free_contraction", filling_pace * filling, SCALES["free_contraction"])
     _write_servo(eq)
     eq.add_decaying("pressure", eq.one("regulator_lag"), SCALES["pressure"])
-    eq.add_memories(("regulator_delay",))
+    eq.add_memories(("regulator_delay", "regulator_pace"))
     eq.add_sensors(SCALES)
 
 

@@ -13,27 +13,11 @@ from pma_gym.codegen.trace import trace
 from pma_gym.data.signals import signals
 from pma_gym.effects.contact.imposed_motion import following_rate
 from pma_gym.effects.effect import Parameters
-from pma_gym.effects.ports import STATION_PORTS, Port
+from pma_gym.effects.rig_ports import IMPOSED_PORTS
 from pma_gym.plant.composition import PlantEquations
 from pma_gym.plant.equilibrium.problem import EquilibriumProblem
 from pma_gym.plant.rigs.rig import Rig
 from pma_gym.plant.rigs.station import TURNING_M
-
-PORTS: dict[str, Port] = {
-    "imposed_motion": Port("acceleration of what the drive moves (m/s^2)", least=1, most=1),
-    "muscle_force": Port("force of the muscle (N), added; positive shortens it"),
-    "contact_force": Port(
-        "force on what moves (N), added; positive in the direction of contraction"
-    ),
-    "rod_force": Port("force of piston, seal and guide (N), added; positive likewise"),
-    "lost_motion": Port("way that is lost before what rubs (m)", most=1),
-    **{name: STATION_PORTS[name] for name in ("muscle_damping", "damping_factor", "chamber")},
-    "regulator_line": Port("pressure that the regulator settles at (Pa)", most=1),
-    "regulator_delay": STATION_PORTS["regulator_delay"],
-    "regulator_lag": Port("rate of the pressure (Pa/s)", most=1),
-    "regulator_pace": STATION_PORTS["regulator_pace"],
-}
-"""Ports of the rig, with the number of effects and the use of their results."""
 
 REFUSED_EFFECTS: dict[str, str] = {
     "load_dependent_damping": "there is no cable; take [damping] or [symmetric_damping]",
@@ -77,7 +61,7 @@ def write_equations(equations: PlantEquations) -> None:
     eq.add_state("velocity", acceleration, SCALES["velocity"])
     source = eq.one("regulator_lag") if lag else at_once
     eq.add_decaying("pressure", source, SCALES["pressure"], "chamber")
-    eq.add_memories(tuple(PORTS))
+    eq.add_memories(tuple(IMPOSED_PORTS))
     eq.add_sensors(SCALES)
     eq.add_event("turning", eq["velocity"], TURNING_M, turning=True)
     # No rate depends on a memory of the way, which is exact over any step that does not turn.
@@ -99,7 +83,7 @@ def solve_equilibrium(problem: EquilibriumProblem) -> None:
 IMPOSED = Rig(
     name="imposed",
     signals=signals("contraction", "force", "pressure"),
-    ports=PORTS,
+    ports=IMPOSED_PORTS,
     parts=(),
     position_tolerances={"contraction": 0.001, "velocity": 0.01},
     write_equations=write_equations,

@@ -10,21 +10,10 @@ from collections.abc import Mapping
 
 from pma_gym.data.signals import signals
 from pma_gym.effects.effect import Parameters
-from pma_gym.effects.ports import Port
+from pma_gym.effects.rig_ports import JOINT_PORTS
 from pma_gym.plant.composition import PlantEquations
 from pma_gym.plant.equilibrium.problem import EquilibriumProblem
 from pma_gym.plant.rigs.rig import Rig
-
-PORTS: dict[str, Port] = {
-    "joint_drive": Port("torque of the drive or motor (N m)", least=1, most=1),
-    "drive_delay": Port("command that has reached the drive (N m, V)", most=1),
-    "drive_lag": Port("command that arrives at the joint (N m, V)", most=1),
-    "drive_gain": Port("torque of the drive besides (N m), added"),
-    "joint_drive_loss": Port("torque that the drive loses on its way (N m), added"),
-    "joint_load": Port("torque that the joint carries at rest (N m), added; positive likewise"),
-    "joint_torque": Port("torque on the joint (N m), added; positive as the angle grows"),
-}
-"""Ports of the joint, with the number of effects and the use of their results."""
 
 SCALES: dict[str, float] = {"angle": 0.04, "spin": 0.16}
 """Error scales of angle and speed (rad, rad/s): a 25th of a station's, for the reason of a slide's
@@ -56,7 +45,7 @@ def write_equations(equations: PlantEquations) -> None:
     eq.outputs = {"angle": eq["angle"], "speed": eq["spin"]}
     eq.add_state("angle", eq["spin"], SCALES["angle"])
     eq.add_state("spin", torque / eq.parameters["inertia"].inertia, SCALES["spin"])
-    eq.add_memories(tuple(PORTS), dict.fromkeys(("drive_delay", "drive_lag"), LEAST_COMMAND))
+    eq.add_memories(tuple(JOINT_PORTS), dict.fromkeys(("drive_delay", "drive_lag"), LEAST_COMMAND))
     eq.add_sensors({"angle": SCALES["angle"], "speed": SCALES["spin"]})
     eq.add_event("turning", eq["spin"], TURNING_RAD, turning=True)
     eq.add_breakpoints()
@@ -77,7 +66,7 @@ def solve_equilibrium(problem: EquilibriumProblem) -> None:
 JOINT = Rig(
     name="joint",
     signals=signals("angle", "speed"),
-    ports=PORTS,
+    ports=JOINT_PORTS,
     parts=("inertia", "joint_start"),
     position_tolerances={"angle": 0.001},
     write_equations=write_equations,

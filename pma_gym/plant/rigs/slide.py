@@ -11,25 +11,11 @@ from collections.abc import Mapping
 
 from pma_gym.data.signals import signals
 from pma_gym.effects.effect import Parameters
-from pma_gym.effects.ports import Port
+from pma_gym.effects.rig_ports import SLIDE_PORTS
 from pma_gym.plant.composition import PlantEquations
 from pma_gym.plant.equilibrium.problem import EquilibriumProblem
 from pma_gym.plant.rigs.rig import Rig
 from pma_gym.plant.rigs.station import TURNING_M
-
-PORTS: dict[str, Port] = {
-    "slide_force": Port("force on the slide (N), added; positive in the direction of contraction"),
-    "contact_force": Port(
-        "force on the slide (N), added; positive in the direction of contraction"
-    ),
-    "muscle_damping": Port("damping coefficient of the slide (N s/m), added"),
-    "two_way_drive": Port("load that the drive asks for (N)", least=1, most=1),
-    "drive_delay": Port("load command that has reached the drive (N)", most=1),
-    "drive_lag": Port("load that arrives at the slide (N)", most=1),
-    "drive_gain": Port("force of the drive besides (N), added; positive as the contraction grows"),
-    "drive_loss": Port("force that the drive loses on its way (N), added; positive likewise"),
-}
-"""Ports of the slide, with the number of effects and the use of their results."""
 
 _PLACE = (
     "the zero of a slide's position is free in every trial, so a law of the place has none; "
@@ -80,7 +66,7 @@ def write_equations(equations: PlantEquations) -> None:
     force = eq["slide_force"] + pushed - eq["resistance"] * eq["velocity"]
     eq.add_state("contraction", eq["velocity"], SCALES["contraction"])
     eq.add_state("velocity", force / slide.mass, SCALES["velocity"])
-    eq.add_memories(tuple(PORTS))
+    eq.add_memories(tuple(SLIDE_PORTS))
     eq.add_sensors(SCALES)
     eq.add_event("turning", eq["velocity"], TURNING_M, turning=True)
     eq.add_breakpoints()
@@ -101,7 +87,7 @@ def solve_equilibrium(problem: EquilibriumProblem) -> None:
 SLIDE = Rig(
     name="slide",
     signals=signals("contraction", "velocity"),
-    ports=PORTS,
+    ports=SLIDE_PORTS,
     parts=PARTS,
     position_tolerances=POSITION_TOLERANCES,
     write_equations=write_equations,
