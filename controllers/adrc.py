@@ -79,7 +79,7 @@ class ADRC(ObserverFeedback[Settings]):
         >>> while not ended:
         ...     volts = controller.act(env.measurement, env.time)
         ...     *_, ended, info = env.step(env.action(volts))
-        >>> info["rmse_mm"] < 0.05
+        >>> bool(info["rmse_mm"] < 0.05)
         True
 
     Source:

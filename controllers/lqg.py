@@ -98,7 +98,7 @@ class LQG:
         >>> while not ended:
         ...     volts = controller.act(env.measurement, env.time)
         ...     *_, broken, ended, info = env.step(env.action(volts))
-        >>> broken, info["rmse_mm"] < 0.05
+        >>> broken, bool(info["rmse_mm"] < 0.05)
         (False, True)
 
     Source:

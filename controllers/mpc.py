@@ -97,7 +97,7 @@ class PreviewMPC:
         >>> ended = False
         >>> while not ended:
         ...     *_, ended, info = env.step(env.action(controller.act(env.measurement, env.time)))
-        >>> info["rmse_mm"] < 0.05
+        >>> bool(info["rmse_mm"] < 0.05)
         True
     """
 

@@ -60,7 +60,7 @@ class Oracle:
         >>> while not ended:
         ...     volts = oracle.act(env.measurement, env.time)
         ...     _, _, terminated, ended, info = env.step(env.action(volts))
-        >>> info["rmse_mm"] < 0.01
+        >>> bool(info["rmse_mm"] < 0.01)
         True
     """
 

@@ -118,9 +118,9 @@ def scheduled_gains(controller: str, station: StationInfo, path: Path = GAINS_FI
             f"{path.name} has no gains of {controller} for the {task.name} task on a "
             f"{model.plant}; tune them: python -m benchmarks tune --model {name}"
         )
-    file = f"python -m benchmarks tune --model {model.name}.toml --out gains.toml"
+    tune = "python -m benchmarks tune --model FILE.toml --out gains.toml"
     mine = f'scheduled_gains("{controller}", env.station, Path("gains.toml"))'
-    fix = f"tune it: {file}, and give the controller {mine} of controllers.design.gains"
+    fix = f"tune its own: {tune}, and give the controller {mine} of controllers.design.gains"
     warn_of_other_plant(station, f"the gains of {controller}", name, fix)
     table = loops[nearest_loop(loop_name(station), known)][kind][controller]
     columns = column_names(_unit(task.schedule.quantity))

@@ -203,8 +203,8 @@ class PMAEnv(Copies, SeededByReset, Episode, gym.Env[NDArray[np.float32], NDArra
         >>> env = PMAEnv("displacement", model="serres2008", pressure_kpa=300, noise=False)
         >>> observation, info = env.reset(seed=1)
         >>> observation, reward, *_, info = env.step(env.action(2.0))
-        >>> info["time_s"], info["motor_voltage_v"], round(info["extension_mm"], 2)
-        (0.01, 2.0, 0.91)
+        >>> print(info["time_s"], info["motor_voltage_v"], f"{info['extension_mm']:.2f}")
+        0.01 2.0 0.91
     """
 
     metadata: dict[str, Any] = {"render_modes": ["human", "rgb_array"], "render_fps": 100}
