@@ -2,7 +2,7 @@
 
 import sys
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
@@ -46,6 +46,9 @@ def run(
         int | None, typer.Option(min=1, help="Only the first ones, for a quick look.")
     ] = None,
     task: Annotated[str, typer.Option(help="Only these tasks, by commas; all if empty.")] = "",
+    traces: Annotated[
+        Literal["csv", "parquet"] | None, typer.Option(help="Also write every case's time series.")
+    ] = None,
 ) -> None:
     """Compare controllers on a frozen suite; an interrupted run goes on where it stopped."""
     from benchmarks.comparison.job import chosen, run_comparison
@@ -54,10 +57,14 @@ def run(
     from benchmarks.suites.frozen import frozen_suite
     from benchmarks.suites.reproduction import ReproductionSuite
     from benchmarks.suites.suite import SuiteError
+    from pma_gym.data.readers.libraries import needed
+    from pma_gym.data.trial import TrialError
     from pma_gym.terminal import SafeConsole
 
     places = chosen_executor(executor, jobs)
     try:
+        if traces == "parquet":
+            needed("pyarrow", "--traces parquet")
         frozen = frozen_suite(suite)
         folder = out or RESULTS / frozen.name
         if isinstance(frozen, ReproductionSuite):
@@ -67,12 +74,12 @@ def run(
                     f"suite {frozen.name} has models, no stations; leave --stations out"
                 )
             selected = frozen.select(controllers=specs, tasks=listed(task))
-            code = run_job(selected, folder, places, SafeConsole())
+            code = run_job(selected, folder, places, SafeConsole(), traces or "")
         else:
             part = frozen.part(stations, listed(task))
             entries = chosen(part, controllers)
-            code = run_comparison(part, entries, folder, places, SafeConsole())
-    except (ControllerError, SuiteError) as error:
+            code = run_comparison(part, entries, folder, places, SafeConsole(), traces or "")
+    except (ControllerError, SuiteError, TrialError) as error:
         refuse(error)
     except KeyboardInterrupt:
         print("Interrupted before the first case; run it again", file=sys.stderr)
@@ -88,6 +95,9 @@ def report(
     out: Annotated[
         Path | None, typer.Option(help="Folder of the page; that of the run if not given.")
     ] = None,
+    vector: Annotated[
+        bool, typer.Option("--vector", help="Pictures as SVG and PDF too, beside the PNG.")
+    ] = False,
 ) -> None:
     """Write a suite's page, its leaderboard, from the journal of its run."""
     from benchmarks.comparison.command_lines import run_command
@@ -102,9 +112,9 @@ def report(
         frozen = frozen_suite(suite)
         folder = results or RESULTS / frozen.name
         if isinstance(frozen, ReproductionSuite):
-            page = report_again(frozen, folder, out or folder, local(2))
+            page = report_again(frozen, folder, out or folder, local(2), vector)
         else:
-            page, ranks, incomplete = run_report(frozen, folder, out or folder)
+            page, ranks, incomplete = run_report(frozen, folder, out or folder, vector)
             print_table(ranks)
             if incomplete:
                 print(f"Not complete, so not in every column: {incomplete}")

@@ -37,7 +37,12 @@ def chosen(suite: FrozenSuite, controllers: str) -> list[Entry]:
 
 
 def run_comparison(
-    suite: FrozenSuite, entries: Sequence[Entry], out: Path, executor: Executor, console: Console
+    suite: FrozenSuite,
+    entries: Sequence[Entry],
+    out: Path,
+    executor: Executor,
+    console: Console,
+    traces: str = "",
 ) -> int:
     """Run what is missing of a suite and write its scores.
 
@@ -47,12 +52,13 @@ def run_comparison(
         out: folder of the results; made if need be.
         executor: where the cases run.
         console: where to print.
+        traces: form of the time series that are written too; none if empty.
     Returns:
         Exit code: 0, 1 if a case failed, 130 if it was interrupted.
     Raises:
         SuiteError: the folder has another suite's results.
     """
-    run = run_missing(suite, entries, out, executor, console)
+    run = run_missing(suite, entries, out, executor, console, traces)
     if not run.complete:
         return INTERRUPTED
     write_scores(out, run.todo, run.rows)

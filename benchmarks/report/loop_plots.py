@@ -20,7 +20,7 @@ from benchmarks.report.plot_style import Style
 from benchmarks.report.tables import NONE, Labels, capital, figure
 from pma_gym.envs import StationInfo
 from pma_gym.pages.document import TextTable
-from pma_gym.pages.figures import legend_below, picture, png
+from pma_gym.pages.figures import Plot, legend_below, picture
 from pma_gym.units import SI_FACTORS
 
 SHOWN_RAD_S = 0.3
@@ -86,7 +86,7 @@ def _margin_cells(condition: Condition, mine: Sequence[Loop]) -> list[str]:
     ]
 
 
-def loop_plot(conditions: Sequence[Condition], styles: Mapping[str, Style]) -> bytes:
+def loop_plot(conditions: Sequence[Condition], styles: Mapping[str, Style]) -> Plot:
     """Bode plots and step responses: a column a pressure."""
     unit = conditions[0].station.task.schedule.unit
     with picture(COLUMN_IN * len(conditions) + AXIS_IN, 11.2) as canvas:
@@ -119,7 +119,7 @@ def loop_plot(conditions: Sequence[Condition], styles: Mapping[str, Style]) -> b
             for n in names
         ]
         legend_below(canvas, handles, min(len(handles), 2 * len(conditions)))
-        return png(canvas)
+        return canvas
 
 
 def _draw(axes: Any, loop: Loop, station: StationInfo, style: Style) -> None:  # noqa: ANN401

@@ -20,6 +20,7 @@ from benchmarks.report.tables import (
 from benchmarks.report.tracking_cost import spending
 from benchmarks.runner.fingerprint import code_digest
 from pma_gym.pages.document import Block, Heading, Paragraph, Picture, TextTable
+from pma_gym.pages.figures import Plot
 
 _RANKS = (
     "A rank is claimed only where all pairs, taken together with 95 % confidence, leave no other: "
@@ -47,10 +48,10 @@ def page_blocks(leaderboard: Leaderboard) -> list[Block]:
     return blocks + _origin_blocks(leaderboard)
 
 
-def score_pictures(leaderboard: Leaderboard) -> dict[str, bytes]:
-    """Every plot of the scores that there are figures for, as PNG by name."""
+def score_pictures(leaderboard: Leaderboard) -> dict[str, Plot]:
+    """Every plot of the scores that there are figures for, by name."""
     styles = styles_of(leaderboard.labels)
-    pictures: dict[str, bytes] = {}
+    pictures: dict[str, Plot] = {}
     single = shown_standings(leaderboard)
     if single:
         pictures["distributions"] = distribution_plot(single, styles)
@@ -59,8 +60,8 @@ def score_pictures(leaderboard: Leaderboard) -> dict[str, bytes]:
     return pictures
 
 
-def loop_pictures(leaderboard: Leaderboard) -> dict[str, bytes]:
-    """Plots of the linear controllers' loops, as PNG by name."""
+def loop_pictures(leaderboard: Leaderboard) -> dict[str, Plot]:
+    """Plots of the linear controllers' loops, by name."""
     styles = styles_of(leaderboard.labels)
     return {
         f"loops_{task}": loop_plot(conditions, styles)

@@ -11,7 +11,7 @@ from benchmarks.report.plot_style import Style
 from benchmarks.report.standings import Standings
 from benchmarks.report.statistics import profile
 from benchmarks.report.tables import capital
-from pma_gym.pages.figures import legend_below, picture, png
+from pma_gym.pages.figures import Plot, legend_below, picture
 
 Styles = Mapping[str, Style]
 
@@ -24,7 +24,7 @@ THRESHOLDS = 120
 """Points of a performance profile."""
 
 
-def distribution_plot(every: Sequence[Standings], styles: Styles) -> bytes:
+def distribution_plot(every: Sequence[Standings], styles: Styles) -> Plot:
     """Plot each controller's cases, and its interquartile mean with its interval."""
     most = max(len(standings.rows) for standings in every)
     with picture(11.0, 0.9 + len(every) * (0.75 + 0.27 * most)) as canvas:
@@ -46,7 +46,7 @@ def distribution_plot(every: Sequence[Standings], styles: Styles) -> bytes:
             Line2D([], [], color="black", linestyle="", marker="o", label="interquartile mean"),
         ]
         legend_below(canvas, handles, 4)
-        return png(canvas)
+        return canvas
 
 
 def _boxes(axis: Any, standings: Standings, styles: Styles) -> None:  # noqa: ANN401
@@ -89,7 +89,7 @@ def _boxes(axis: Any, standings: Standings, styles: Styles) -> None:  # noqa: AN
     axis.set_title(capital(measure.name), loc="left")
 
 
-def profile_plot(every: Sequence[Standings], styles: Styles) -> bytes:
+def profile_plot(every: Sequence[Standings], styles: Styles) -> Plot:
     """Share of the cases with an error up to a threshold, with 95 % bands."""
     with picture(11.0, 0.9 + 3.6 * len(every)) as canvas:
         axes: Any = canvas.subplots(len(every), 1, squeeze=False)
@@ -118,7 +118,7 @@ def profile_plot(every: Sequence[Standings], styles: Styles) -> bytes:
             axis.set_xlabel(f"RMSE at most ({errors.measure.unit})")
             axis.set_title(capital(errors.measure.name), loc="left")
         legend_below(canvas, _handles(every, styles), 4)
-        return png(canvas)
+        return canvas
 
 
 def _marked(share: np.ndarray, place: float) -> int:
@@ -126,7 +126,7 @@ def _marked(share: np.ndarray, place: float) -> int:
     return int(np.argmax(share >= 0.15 + 0.7 * place))
 
 
-def pressure_plot(every: Sequence[Standings], styles: Styles) -> bytes:
+def pressure_plot(every: Sequence[Standings], styles: Styles) -> Plot:
     """Median error of every controller at every pressure, with the middle half of the best."""
     with picture(11.0, 0.9 + 3.2 * len(every)) as canvas:
         axes: Any = canvas.subplots(len(every), 1, squeeze=False)
@@ -151,7 +151,7 @@ def pressure_plot(every: Sequence[Standings], styles: Styles) -> bytes:
             axis.set_ylabel(f"median RMSE ({errors.measure.unit})")
             axis.set_title(capital(errors.measure.name), loc="left")
         legend_below(canvas, _handles(every, styles), 4)
-        return png(canvas)
+        return canvas
 
 
 def _logarithmic(line: Any, axis: Any) -> None:  # noqa: ANN401

@@ -23,6 +23,7 @@ from benchmarks.report.tables import ranks_table
 from benchmarks.suites.suite import FrozenSuite
 from pma_gym.cli.progress import StepProgress
 from pma_gym.pages.document import TextTable, to_html, to_markdown
+from pma_gym.pages.figures import picture_files, pngs
 
 OnStep = Callable[[str, int, int], None]
 
@@ -31,13 +32,16 @@ NUMBERS, PAIRS = "leaderboard.csv", "pairs.csv"
 PAGE, TEXT = "report.html", "report.md"
 
 
-def run_report(suite: FrozenSuite, results: Path, out: Path) -> tuple[Path, TextTable, str]:
+def run_report(
+    suite: FrozenSuite, results: Path, out: Path, vector: bool = False
+) -> tuple[Path, TextTable, str]:
     """Read a run's results and write the page; says on stderr what it is at.
 
     Args:
         suite: the suite that was run.
         results: folder of the results.
         out: folder of the page; may be the same.
+        vector: whether every picture is written as SVG and PDF too.
     Returns:
         The page, the ranks as a table for a terminal, and which controllers are left out of a
         measure because the run has not finished their cases (empty if none).
@@ -46,13 +50,16 @@ def run_report(suite: FrozenSuite, results: Path, out: Path) -> tuple[Path, Text
     """
     with StepProgress() as progress:
         leaderboard = read_leaderboard(suite, results)
-        page = write_leaderboard(leaderboard, out, progress)
+        page = write_leaderboard(leaderboard, out, progress, vector)
     ranks = ranks_table(leaderboard.shown, leaderboard.labels)
     return page, ranks, incomplete_counts(leaderboard)
 
 
 def write_leaderboard(
-    leaderboard: Leaderboard, out: Path, progress: OnStep = lambda *step: None
+    leaderboard: Leaderboard,
+    out: Path,
+    progress: OnStep = lambda *step: None,
+    vector: bool = False,
 ) -> Path:
     """Write the page, as HTML, Markdown and pictures, and the numbers behind it.
 
@@ -60,17 +67,18 @@ def write_leaderboard(
         leaderboard: what is to be shown.
         out: folder; made if need be.
         progress: called with a step's name, how much of it is done, and of how much.
+        vector: whether every picture is written as SVG and PDF too.
     Returns:
         The page.
     """
-    with Background(partial(score_pictures, leaderboard)) as plots:
+    with Background(partial(_score_files, leaderboard, vector)) as plots:
         _compute(leaderboard, progress)
         progress("plots", 0, 2)
-        of_loops = loop_pictures(leaderboard)
+        of_loops = picture_files(loop_pictures(leaderboard), vector)
         progress("plots", 1, 2)
-        pictures = plots.result() | of_loops
+        files = plots.result() | of_loops
         progress("plots", 2, 2)
-    blocks = page_blocks(leaderboard)
+    blocks, pictures = page_blocks(leaderboard), pngs(files)
     texts = {
         TEXT: to_markdown(blocks, pictures, PLOTS),
         PAGE: to_html(blocks, pictures),
@@ -80,11 +88,15 @@ def write_leaderboard(
     out.mkdir(parents=True, exist_ok=True)
     # All is computed before anything is replaced, so that no folder mixes two runs.
     shutil.rmtree(out / PLOTS, ignore_errors=True)
-    for name, image in pictures.items():
-        write_bytes(out / PLOTS / f"{name}.png", image)
+    for name, content in files.items():
+        write_bytes(out / PLOTS / name, content)
     for name, text in texts.items():
         write_text(out / name, text)
     return out / PAGE
+
+
+def _score_files(leaderboard: Leaderboard, vector: bool) -> dict[str, bytes]:
+    return picture_files(score_pictures(leaderboard), vector)
 
 
 def _compute(leaderboard: Leaderboard, progress: OnStep) -> None:

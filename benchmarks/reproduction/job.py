@@ -26,7 +26,9 @@ _OF_THE_SUITE = ("schema", "suite", "contenders", "complete", "code")
 _TIMES = ("steps", "step_seconds", "seconds")
 
 
-def run_job(suite: ReproductionSuite, out: Path, executor: Executor, console: Console) -> int:
+def run_job(
+    suite: ReproductionSuite, out: Path, executor: Executor, console: Console, traces: str = ""
+) -> int:
     """Run what is missing of a suite, and write its report.
 
     Files of an earlier report stay whole until this one replaces them.
@@ -36,10 +38,11 @@ def run_job(suite: ReproductionSuite, out: Path, executor: Executor, console: Co
         out: folder of the results; made if need be.
         executor: where the cases run.
         console: where to print.
+        traces: form of the time series that are written too; none if empty.
     Returns:
         Exit code: 0, 1 if a case failed, 130 if it was interrupted.
     """
-    run = run_missing(suite, suite.entries, out, executor, console)
+    run = run_missing(suite, suite.entries, out, executor, console, traces)
     if not run.complete:
         return INTERRUPTED
     try:
@@ -51,7 +54,9 @@ def run_job(suite: ReproductionSuite, out: Path, executor: Executor, console: Co
     return FAILED if results.failures else 0
 
 
-def report_again(suite: ReproductionSuite, folder: Path, out: Path, executor: Executor) -> Path:
+def report_again(
+    suite: ReproductionSuite, folder: Path, out: Path, executor: Executor, vector: bool = False
+) -> Path:
     """Write the report of a run that is in a folder; nothing is scored.
 
     Args:
@@ -59,6 +64,7 @@ def report_again(suite: ReproductionSuite, folder: Path, out: Path, executor: Ex
         folder: of the run.
         out: folder of the page; may be the same.
         executor: where what the page needs beside the rows is computed.
+        vector: whether every picture is written as SVG and PDF too.
     Returns:
         The page.
     Raises:
@@ -66,7 +72,7 @@ def report_again(suite: ReproductionSuite, folder: Path, out: Path, executor: Ex
     """
     run = _finished_run(suite, folder)
     out.mkdir(parents=True, exist_ok=True)
-    write_report(_results(suite, run, folder, executor), out)
+    write_report(_results(suite, run, folder, executor), out, vector)
     return out / "report.html"
 
 

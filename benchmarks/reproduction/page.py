@@ -12,6 +12,7 @@ from benchmarks.reproduction.summary_plots import replay_plot, rmse_plot
 from benchmarks.reproduction.tables import regression_table, rmse_table, summary_table
 from benchmarks.runner.phase_score import PHASES
 from pma_gym.pages.document import Block, Heading, Paragraph, Picture, TextTable
+from pma_gym.pages.figures import Plot
 from pma_gym.plant.model import load_model
 
 _TASKS = {"displacement": "Isokinetic displacement", "rotation": "Isokinetic rotation"}
@@ -38,9 +39,9 @@ def report_blocks(results: Results) -> list[Block]:
     return blocks
 
 
-def report_pictures(results: Results) -> dict[str, bytes]:
+def report_pictures(results: Results) -> dict[str, Plot]:
     """Every plot that the run has the figures for, as PNG by name."""
-    pictures: dict[str, bytes] = {}
+    pictures: dict[str, Plot] = {}
     for task, pressures in results.suite.pressures_kpa.items():
         pictures[f"rmse_{task}"] = rmse_plot(results, task)
         if any(results.trials(task, pressure) for pressure in pressures):

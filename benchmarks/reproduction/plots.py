@@ -14,7 +14,7 @@ from benchmarks.runner.phase_score import UNITS, measured_score
 from pma_gym.data.trial import Trial
 from pma_gym.data.trial_schedule import SCHEDULES, TrialSchedule
 from pma_gym.metrics import phase_times
-from pma_gym.pages.figures import legend_below, picture, png
+from pma_gym.pages.figures import Plot, legend_below, picture
 from pma_gym.units import SI_FACTORS
 
 _ENLARGED = {"displacement": 0.4, "rotation": 1.6}
@@ -24,7 +24,7 @@ LABELS = {"displacement": "extension", "rotation": "rotation"}
 """What the position of a task is called."""
 
 
-def tracking_plot(results: Results, task: str) -> bytes:
+def tracking_plot(results: Results, task: str) -> Plot:
     """Response, error and motor voltage over time at a low, a middle and a high pressure."""
     pressures = pictured_pressures(results, task)
     styles = controller_styles(results.suite)
@@ -46,10 +46,10 @@ def tracking_plot(results: Results, task: str) -> bytes:
         axes[3, 0].set_ylim(0.0, None)
         figure.align_ylabels()
         legend_below(figure, _handles(styles), 3)
-        return png(figure)
+        return figure
 
 
-def actual_against_ideal_plot(results: Results, task: str) -> bytes:
+def actual_against_ideal_plot(results: Results, task: str) -> Plot:
     """Actual position over the ideal one, as figures 32 and 36 have it."""
     pressures = pictured_pressures(results, task)
     styles = controller_styles(results.suite)
@@ -70,7 +70,7 @@ def actual_against_ideal_plot(results: Results, task: str) -> bytes:
             axis.set_xlabel(f"ideal {LABELS[task]} ({unit})")
         axes[0, 0].set_ylabel(f"actual {LABELS[task]} ({unit})")
         legend_below(figure, _handles(styles), 3)
-        return png(figure)
+        return figure
 
 
 def pictured_pressures(results: Results, task: str) -> list[float]:

@@ -11,18 +11,21 @@ from benchmarks.reproduction.results import Results, csv_text, json_text
 from benchmarks.reproduction.rotation_reading import entries
 from benchmarks.reproduction.targets import check_targets
 from pma_gym.pages.document import to_html, to_markdown
+from pma_gym.pages.figures import picture_files, pngs
 
 PLOTS = "plots"
 
 
-def write_report(results: Results, out: Path) -> None:
+def write_report(results: Results, out: Path, vector: bool = False) -> None:
     """Write everything; all is computed before anything is replaced, so no folder mixes two runs.
 
     Args:
         results: the run.
         out: folder; made if need be.
+        vector: whether every picture is written as SVG and PDF too.
     """
-    pictures = report_pictures(results)
+    files = picture_files(report_pictures(results), vector)
+    pictures = pngs(files)
     checks = check_targets(results)
     blocks = report_blocks(results)
     errors = all_replay_errors(results, results.suite.models[0])
@@ -38,7 +41,7 @@ def write_report(results: Results, out: Path) -> None:
         ),
     }
     shutil.rmtree(out / PLOTS, ignore_errors=True)
-    for name, image in pictures.items():
-        write_bytes(out / PLOTS / f"{name}.png", image)
+    for name, content in files.items():
+        write_bytes(out / PLOTS / name, content)
     for name, text in texts.items():
         write_text(out / name, text)

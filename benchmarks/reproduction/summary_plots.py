@@ -10,7 +10,7 @@ from benchmarks.report.plot_style import BOUND, MEASURED, controller_styles
 from benchmarks.reproduction.replay import QUANTITIES, all_replay_errors, summarise
 from benchmarks.reproduction.results import Results
 from benchmarks.runner.phase_score import PHASES, UNITS, measured_score
-from pma_gym.pages.figures import legend_below, picture, png
+from pma_gym.pages.figures import Plot, legend_below, picture
 
 _GREY = "#666666"
 QUANTITY_LABELS = {
@@ -24,7 +24,7 @@ QUANTITY_LABELS = {
 """What the errors of a replay are called; `unit` is mm or deg."""
 
 
-def rmse_plot(results: Results, task: str) -> bytes:
+def rmse_plot(results: Results, task: str) -> Plot:
     """RMSE of every controller at every pressure of a task, measured beside it."""
     suite = results.suite
     pressures = suite.pressures_kpa[task]
@@ -57,10 +57,10 @@ def rmse_plot(results: Results, task: str) -> bytes:
         if "III" in phases and results.bounds:
             handles.append(Line2D([], [], label="Achievable bound", **BOUND))
         legend_below(figure, handles, min(len(handles), 6))
-        return png(figure)
+        return figure
 
 
-def replay_plot(results: Results) -> bytes:
+def replay_plot(results: Results) -> Plot:
     """Signed errors of the replay: a row a quantity, a column a phase, a bar a trial."""
     errors = all_replay_errors(results, results.suite.models[0])
     color = controller_styles(results.suite)[results.suite.goals.replay].color
@@ -85,4 +85,4 @@ def replay_plot(results: Results) -> bytes:
         mean = Line2D([], [], color=_GREY, linestyle=(0, (4, 2)), label="mean over the trials")
         bars = Patch(color=color, label="simulated less measured")
         legend_below(figure, [bars, mean], 2)
-        return png(figure)
+        return figure

@@ -13,6 +13,7 @@ from benchmarks.runner.isolated_controller import Isolated, driver
 from benchmarks.runner.phase_score import score_trial
 from benchmarks.runner.rollout import Rollout, rollout
 from benchmarks.suites.suite import Entry, Episode, FrozenSuite
+from pma_gym.data.files.trial_formats import ENCODERS
 from pma_gym.engine.nominal_rig import nominal_model
 from pma_gym.envs import PMAEnv
 from pma_gym.plant.model import Model
@@ -70,21 +71,26 @@ def cases(suite: FrozenSuite, entries: tuple[Entry, ...]) -> list[Case]:
     ]
 
 
-def run_case(case: Case, model: Model | None = None) -> Row:
+def run_case(case: Case, model: Model | None = None, traces: str = "") -> Row:
     """Run a case; a user's controller runs in a separate process.
 
     Args:
         case: the case.
         model: the station's own; drawn anew if not given.
+        traces: form of its time series, `csv` or `parquet`; none if empty.
     Returns:
-        Its row, without figures if a physical limit ended it early.
+        Its row, without figures if a physical limit ended it early; `trace` has the contents of
+        the file of its time series.
     Raises:
         Exception: whatever the controller or the environment raised.
     """
     began = time.perf_counter()
     done, environment = drive(case, model)
     share, farthest = done.clipped
-    clipped = {"clipped_share": share, "clipped_v": farthest}
+    clipped: Row = {"clipped_share": share, "clipped_v": farthest}
+    if traces:
+        origin = {name: str(value) for name, value in blank_row(case).items()}
+        clipped["trace"] = ENCODERS[f".{traces}"](done.trace, origin)
     if done.ended_by:
         end = f"ended after {done.steps * done.period:.4g} s {BY_LIMIT}: {done.ended_by}"
         return blank_row(case) | {"failure": end} | clipped

@@ -7,11 +7,15 @@ from pathlib import Path
 
 from benchmarks.executors.executor import Executor, run_all
 from benchmarks.executors.failures import ProcessDied
+from benchmarks.files import write_bytes
 from benchmarks.runner.case import Case, Row, cases, failed_row, run_case
 from benchmarks.runner.fingerprint import key
 from benchmarks.runner.journal import JOURNAL, Journal, case_rows
 from benchmarks.suites.suite import Entry, Episode, FrozenSuite
 from pma_gym.envs import PMAEnv
+
+TRACES = ("csv", "parquet")
+"""Forms of time series."""
 
 Identity = tuple[str, Episode]
 """What tells a case from a suite's others: the controller's name and the episode."""
@@ -27,6 +31,7 @@ class PendingCases:
         cases: every case of these controllers.
         known: rows of those that are done.
         outdated: rows of these controllers that were made with something else.
+        traces: form of the time series that are written too; none if empty.
     """
 
     suite: FrozenSuite
@@ -34,6 +39,7 @@ class PendingCases:
     cases: tuple[Case, ...]
     known: Mapping[Identity, Row]
     outdated: int
+    traces: str = ""
 
     @property
     def missing(self) -> list[Case]:
@@ -51,10 +57,18 @@ def row_identity(row: Row) -> Identity:
     return row["controller"], Episode(*(row[name] for name in Episode._fields))
 
 
-def pending_cases(suite: FrozenSuite, entries: Iterable[Entry], out: Path) -> PendingCases:
+def trace_file(case: Case, out: Path, form: str) -> Path:
+    """Return the file of a case's time series in a folder of results."""
+    return out / "traces" / f"{case.name.replace('/', '-')}.{form}"
+
+
+def pending_cases(
+    suite: FrozenSuite, entries: Iterable[Entry], out: Path, traces: str = ""
+) -> PendingCases:
     """Return the cases of some controllers that a folder's journal lacks.
 
-    A row counts only if its key is that of now. One whose process died counts as not run.
+    A row counts only if its key is that of now. One whose process died counts as not run, and so
+    does one whose time series are asked for and missing.
     """
     entries = tuple(entries)
     keys = {entry.spec.name: key(suite, entry.spec) for entry in entries}
@@ -67,9 +81,11 @@ def pending_cases(suite: FrozenSuite, entries: Iterable[Entry], out: Path) -> Pe
             outdated += 1
         elif not row["failure"].startswith(ProcessDied.__name__):
             known[row_identity(row)] = row
-    asked = {identity(case) for case in wanted}
-    known = {its: row for its, row in known.items() if its in asked}
-    return PendingCases(suite, keys, wanted, known, outdated)
+    there = {
+        identity(case) for case in wanted if not traces or trace_file(case, out, traces).is_file()
+    }
+    known = {its: row for its, row in known.items() if its in there}
+    return PendingCases(suite, keys, wanted, known, outdated, traces)
 
 
 def execute(
@@ -98,15 +114,20 @@ def execute(
             row = failed_row(case, result) if isinstance(result, BaseException) else result
             assert isinstance(row, dict)
             row = {"key": todo.keys[case.spec.name]} | row
+            # What other code made goes with its row.
+            for form in TRACES:
+                trace_file(case, out, form).unlink(missing_ok=True)
+            if "trace" in row:
+                write_bytes(trace_file(case, out, todo.traces), row.pop("trace"))
             journal.append(row)
             on_done(row)
 
-        return run_all([_work(case, todo.suite) for case in missing], executor, keep, untrusted)
+        return run_all([_work(case, todo) for case in missing], executor, keep, untrusted)
 
 
-def _work(case: Case, suite: FrozenSuite) -> partial[Row]:
+def _work(case: Case, todo: PendingCases) -> partial[Row]:
     """A case to be run in any process, which need not draw the station again."""
-    return partial(run_case, case, suite.station(case.episode.station).model)
+    return partial(run_case, case, todo.suite.station(case.episode.station).model, todo.traces)
 
 
 def compile_kernels(suite: FrozenSuite) -> None:

@@ -14,12 +14,14 @@ from numpy.typing import NDArray
 
 from benchmarks.runner.controller_spec import ControllerError
 from controllers.controller import Controller
+from pma_gym.data.signals import SIGNALS
 from pma_gym.data.trial import Trial
 from pma_gym.engine.actions import HIGHEST_VOLTAGE
 from pma_gym.envs import ENVIRONMENTS, Measurement, PMAEnv
 from pma_gym.metrics import SAMPLE_RATE_HZ
 from pma_gym.plant.model import Model
 from pma_gym.tasks import Task
+from pma_gym.units import SI_FACTORS, suffix
 
 # 5 s in steps of 0.01 s are 499.99999999999994 steps.
 _ROUNDING = 1e-9
@@ -64,13 +66,9 @@ class Rollout:
     @cached_property
     def trial(self) -> Trial:
         """The rollout as a trial at 384 Hz: true position, commands in force, last readings."""
-        times = np.arange(self.position.size) / SAMPLE_RATE_HZ
-        step = np.floor(times / self.period + _ROUNDING).astype(int)
-        # The last grid point may fall on the end of the last step, where no further command came.
-        volts = self.commands[np.minimum(step, self.steps - 1)]
-        held = self.readings[step]
+        volts, held = self.commands[self._driven], self.readings[self._step]
         return Trial(
-            time=times,
+            time=self._times,
             commands={"motor_voltage": volts[:, 0], "regulator_voltage": volts[:, 1]},
             measurements={
                 "contraction": self.start - held[:, 0],
@@ -80,6 +78,47 @@ class Rollout:
             },
             truth={self.task.schedule.quantity: self.position + self._zero},
         )
+
+    @property
+    def trace(self) -> dict[str, NDArray[np.float64]]:
+        """The rollout as a table at 384 Hz: values by column, with units in the names.
+
+        Voltages and readings are the last ones. Positions are counted as the reference is; where
+        no position is followed, none is measured.
+        """
+        schedule, trial = self.task.schedule, self.trial
+        followed, factor = schedule.followed, SI_FACTORS[schedule.unit]
+        positions = {"reference": schedule.reference(trial.time), "true_position": self.position}
+        if followed.is_angle:
+            positions["measured_position"] = trial.rotation
+        elif followed.is_travel:
+            pulled = self.start - trial.measurements["contraction"]
+            positions["measured_position"] = -pulled if followed.shortens else pulled
+        outputs = {f"measured_{name}": values for name, values in trial.measurements.items()}
+        return {
+            "time_s": trial.time,
+            **{f"{name}_{schedule.suffix}": its / factor for name, its in positions.items()},
+            "asked_voltage_v": self.asked[self._driven],
+            **{
+                f"{name}_{suffix(signal.unit)}": values / SI_FACTORS[signal.unit]
+                for name, values in {**trial.commands, **outputs}.items()
+                for signal in (SIGNALS[name.removeprefix("measured_")],)
+            },
+        }
+
+    @cached_property
+    def _times(self) -> NDArray[np.float64]:
+        return np.arange(self.position.size) / SAMPLE_RATE_HZ
+
+    @cached_property
+    def _step(self) -> NDArray[np.int64]:
+        """Control step of each sample."""
+        return np.floor(self._times / self.period + _ROUNDING).astype(int)
+
+    @property
+    def _driven(self) -> NDArray[np.int64]:
+        # The last grid point may fall on the end of the last step, where no further command came.
+        return np.minimum(self._step, self.steps - 1)
 
     @property
     def clipped(self) -> tuple[float, float]:

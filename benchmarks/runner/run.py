@@ -48,7 +48,12 @@ class SuiteRun:
 
 
 def run_missing(
-    suite: FrozenSuite, entries: Sequence[Entry], out: Path, executor: Executor, console: Console
+    suite: FrozenSuite,
+    entries: Sequence[Entry],
+    out: Path,
+    executor: Executor,
+    console: Console,
+    traces: str = "",
 ) -> SuiteRun:
     """Run what a folder's journal lacks of a suite.
 
@@ -58,6 +63,7 @@ def run_missing(
         out: folder of the results; made if need be.
         executor: where the cases run.
         console: where to print.
+        traces: form of the time series that are written too; none if empty.
     Returns:
         The run; Ctrl-C ends it early, says so, and what is done stays in the journal.
     Raises:
@@ -65,7 +71,7 @@ def run_missing(
     """
     began = time.perf_counter()
     check_folder(suite, out)
-    todo = pending_cases(suite, entries, out)
+    todo = pending_cases(suite, entries, out, traces)
     console.print(_greeting(todo, entries, out, executor.jobs), highlight=False)
     info = run_info(todo, entries, out, executor.jobs)
     write_run(out, info, complete=False)

@@ -16,10 +16,11 @@ from pma_gym.data.trial_checks import (
     check_time,
     check_values,
 )
-from pma_gym.data.trial_columns import BY_QUANTITY, COLUMNS, TrialError, suggestion
+from pma_gym.data.trial_columns import BY_QUANTITY, COLUMNS, Column, TrialError, suggestion
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+    from pandas import DataFrame
 
 __all__ = ["COMMANDS", "MEASUREMENTS", "TRUTH", "Trial", "TrialError"]
 
@@ -133,6 +134,29 @@ class Trial:
         from pma_gym.data.trial_plot import plot_series, series_of
 
         return plot_series({"": series_of(self)})
+
+    def to_frame(self) -> "DataFrame":
+        """Return a pandas DataFrame: a row a sample, the columns of files with units in the names.
+
+        The first column is `time_s`; true values stand behind `true_`, as `true_load_n`.
+
+        Raises:
+            ImportError: pandas is not installed.
+        """
+        try:
+            import pandas
+        except ImportError:
+            raise ImportError(
+                "to_frame needs pandas, which is not installed: pip install pandas"
+            ) from None
+        groups = (("", self.commands), ("", self.measurements), ("true_", self.truth))
+        columns = {
+            f"{before}{column.name}": column.from_si(values)
+            for before, group in groups
+            for name, values in group.items()
+            for column in (Column.of(SIGNALS[name]),)
+        }
+        return pandas.DataFrame({"time_s": self.time, **columns})
 
     def _repr_html_(self) -> str:
         """What a notebook shows: the plot, and below it where the trial comes from."""

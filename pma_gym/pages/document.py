@@ -101,9 +101,6 @@ DPI = 120
 _MANY = 12
 """Columns beyond which print breaks words of the header, to fit the page."""
 
-_PANELS_FROM = 800
-"""Width (CSS pixels) beyond which a picture has panels side by side: a phone scrolls over it."""
-
 
 def to_markdown(blocks: Sequence[Block], pictures: Mapping[str, bytes], folder: str) -> str:
     """Render blocks as Markdown that links pictures in a folder beside the file.
@@ -205,9 +202,9 @@ def html_block(block: Block, pictures: Mapping[str, bytes]) -> str:
             alt = html.escape(caption)
             width = _shown_width(pictures[name])
             image = f'<img alt="{alt}" width="{width}" src="data:image/png;base64,{data}">'
-            shown = "printed" if printed else "panels" if width > _PANELS_FROM else "single"
+            shown = ' class="printed"' if printed else ""
             words = f"<figcaption>{_inline(caption)}</figcaption>"
-            return f'<figure class="{shown}">{image}{words}</figure>'
+            return f"<figure{shown}>{image}{words}</figure>"
         case InteractiveFigure(name, caption):
             plot = f'<div class="plot" id="figure-{html.escape(name)}"></div>'
             words = f"<figcaption>{_inline(caption)}</figcaption>"
@@ -226,15 +223,17 @@ def _html_table(table: TextTable) -> str:
     columns = len(table.header)
     body = []
     ruled = False
+    # A phone shows them, where a row is a list.
+    names = [_data_name(name) for name in table.header]
     for row in table.rows:
         if len(row) != columns:
             ruled = True
             continue
         cells = "".join(
-            f"<td{_verdict_class(cell)}>{_inline(cell)}</td>"
+            f"<td{name}{_verdict_class(cell)}>{_inline(cell)}</td>"
             if column >= table.words
-            else f"<th>{_inline(cell)}</th>"
-            for column, cell in enumerate(row)
+            else f"<th{name}>{_inline(cell)}</th>"
+            for column, (name, cell) in enumerate(zip(names, row, strict=True))
         )
         body.append(f'<tr class="ruled">{cells}</tr>' if ruled else f"<tr>{cells}</tr>")
         ruled = False
@@ -245,6 +244,11 @@ def _html_table(table: TextTable) -> str:
         f"<caption><span>{_inline(table.title)}</span></caption>"
         f"<thead>{head}</thead><tbody>{''.join(body)}</tbody></table></div>"
     )
+
+
+def _data_name(column: str) -> str:
+    name = html.escape(re.sub(r"[`*]", "", column.replace(_GROUP, ", ")))
+    return f' data-name="{name}"' if name else ""
 
 
 def _html_header(table: TextTable) -> str:

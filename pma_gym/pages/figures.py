@@ -2,7 +2,7 @@
 
 import io
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any
 
@@ -31,6 +31,7 @@ _RULES: dict[Any, Any] = {
     "figure.facecolor": "white",
     # Names and titles are data: a dollar sign in one is no formula.
     "text.parse_math": False,
+    "svg.hashsalt": "pma-gym",
 }
 
 
@@ -74,11 +75,43 @@ def picture(width: float, height: float) -> Iterator[Plot]:
         yield figure
 
 
+_METADATA: dict[str, dict[str, Any]] = {
+    "png": {"Software": None},
+    "svg": {"Date": None},
+    "pdf": {"CreationDate": None},
+}
+"""What each form would say that another day has otherwise."""
+
+
+def rendered(figure: Figure, form: str) -> bytes:
+    """Render the figure as `png`, `svg` or `pdf`; the same figure gives the same bytes."""
+    out = io.BytesIO()
+    with mpl.rc_context(_RULES):
+        figure.savefig(out, format=form, dpi=DPI, metadata=_METADATA[form])
+    return out.getvalue()
+
+
 def png(figure: Figure) -> bytes:
     """Render the figure as PNG; the same figure gives the same bytes."""
-    out = io.BytesIO()
-    figure.savefig(out, format="png", dpi=DPI, metadata={"Software": None})
-    return out.getvalue()
+    return rendered(figure, "png")
+
+
+def picture_files(figures: Mapping[str, Figure], vector: bool) -> dict[str, bytes]:
+    """Render figures as PNG, if wanted as SVG and PDF too.
+
+    Returns:
+        Contents by name of file.
+    """
+    forms = _METADATA if vector else ("png",)
+    return {
+        f"{name}.{form}": rendered(each, form) for name, each in figures.items() for form in forms
+    }
+
+
+def pngs(files: Mapping[str, bytes]) -> dict[str, bytes]:
+    """The PNGs among files, by the names of their figures."""
+    suffix = ".png"
+    return {n.removesuffix(suffix): content for n, content in files.items() if n.endswith(suffix)}
 
 
 def legend_below(figure: Figure, handles: Sequence[object], columns: int) -> None:

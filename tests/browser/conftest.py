@@ -7,6 +7,18 @@ import pytest
 WIDTHS = {"phone": 360, "desk": 1280}
 
 
+_SIDEWAYS = """[...document.querySelectorAll("*")].filter(each => each.clientWidth > 0
+  && each.scrollWidth > each.clientWidth + 1
+  && (each === document.documentElement
+      || ["auto", "scroll"].includes(getComputedStyle(each).overflowX)))
+  .map(each => `${each.tagName}.${each.className}`)"""
+
+
+def sideways(page):
+    """What scrolls sideways: the page, or a part of it."""
+    return page.evaluate(_SIDEWAYS)
+
+
 @pytest.fixture(scope="session")
 def chromium():
     """The browser; skipped where there is none."""

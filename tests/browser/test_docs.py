@@ -9,6 +9,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.browser.conftest import sideways
+
 pytestmark = pytest.mark.browser
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -40,8 +42,8 @@ def test_every_page_loads_without_error_and_fits_a_phone(site, open_page):
     broken = {}
     for name in names:
         page, faults = open_page(f"{address}/{name}/", "phone")
-        wide = page.evaluate("document.documentElement.scrollWidth - window.innerWidth")
-        if faults or wide > 0:
+        wide = sideways(page)
+        if faults or wide:
             broken[name] = (faults, wide)
         page.context.close()
     assert broken == {}

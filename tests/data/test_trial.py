@@ -1,6 +1,7 @@
 import copy
 import dataclasses
 import pickle
+import sys
 
 import numpy as np
 import pytest
@@ -125,3 +126,24 @@ def test_extension_needs_a_contraction_at_the_start():
         _ = trial(measurements={"contraction": [np.nan, 0.1, 0.1]}).extension
     with pytest.raises(TrialError, match="has no rotation_deg; it has no measurements"):
         _ = trial(measurements={}).rotation
+
+
+def test_a_frame_has_a_row_a_sample_and_units_in_its_names(monkeypatch):
+    pandas = pytest.importorskip("pandas")
+    trial = Trial(
+        time=[0.0, 0.5],
+        commands={"motor_voltage": [1.0, 2.0]},
+        measurements={"contraction": [0.0253, np.nan]},
+        truth={"load": [10.0, 20.0], "extension": [0.0, 1e-3]},
+    )
+    expected = {
+        "time_s": [0.0, 0.5],
+        "motor_voltage_v": [1.0, 2.0],
+        "contraction_mm": [25.3, np.nan],
+        "true_load_n": [10.0, 20.0],
+        "true_extension_mm": [0.0, 1.0],
+    }
+    pandas.testing.assert_frame_equal(trial.to_frame(), pandas.DataFrame(expected))
+    monkeypatch.setitem(sys.modules, "pandas", None)
+    with pytest.raises(ImportError, match=r"^to_frame needs pandas.*: pip install pandas$"):
+        trial.to_frame()

@@ -10,6 +10,7 @@ import sys
 import time
 from pathlib import Path
 
+import numpy as np
 import pytest
 from rich.console import Console
 from typer.testing import CliRunner
@@ -303,6 +304,28 @@ def test_a_quick_look_is_a_part_of_the_whole_and_says_who_is_better(tmp_path):
         suite.part(7)
     with pytest.raises(SuiteError, match="has the tasks displacement, got --task rotation"):
         suite.part(tasks=["rotation"])
+
+
+def test_time_series_are_one_table_a_case_that_says_what_its_row_says(suite, tmp_path):
+    out, part = tmp_path / "out", suite.part(1)
+    assert run(part, "pid", out)[0] == 0 and not (out / "traces").exists()
+    # Cases without their series count as not run.
+    entries = chosen(part, "pid")
+    assert run_comparison(part, entries, out, ONE, Console(quiet=True), "csv") == 0
+    rows = {row["pressure_kpa"]: row for row in finished_rows(out)}
+    assert len(rows) == 2
+    for kpa, row in rows.items():
+        series = np.genfromtxt(
+            out / "traces" / f"pid--1-displacement-{kpa:g}-0.csv", delimiter=",", names=True
+        )
+        units = [name.rpartition("_")[2] for name in series.dtype.names]
+        assert units == ["s", "mm", "mm", "mm", "v", "v", "v", "mm", "deg", "n", "kpa"]
+        error = series["true_position_mm"] - series["reference_mm"]
+        assert np.sqrt(np.mean(error**2)) == pytest.approx(row["rmse"], rel=0.01)
+        lag = series["measured_position_mm"] - series["true_position_mm"]
+        assert 0.0 < np.abs(lag).max() < 0.5
+    assert not pending_cases(part, entries, out, "csv").missing
+    assert len(pending_cases(part, entries, out, "parquet").missing) == 2
 
 
 def test_suites_lists_what_can_be_run():

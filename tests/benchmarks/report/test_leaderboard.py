@@ -24,6 +24,7 @@ from benchmarks.suites.suite import Episode, SuiteError
 from benchmarks.suites.target import parse_target
 from controllers import CONTROLLERS
 from pma_gym.pages.document import to_markdown
+from pma_gym.pages.figures import picture_files
 from tests.benchmarks.report.simulated_rows import (
     LEVELS,
     simulated_row,
@@ -100,7 +101,13 @@ def test_figures_do_not_depend_on_the_order_of_the_rows():
     assert len({pairs_csv(each) for each in boards}) == 1
     styles = styles_of(boards[0].labels)
     standings = [list(each.standings.values()) for each in boards]
-    assert profile_plot(standings[0], styles) == profile_plot(standings[1], styles)
+    pictures = [picture_files({"": profile_plot(each, styles)}, vector=True) for each in standings]
+    assert pictures[0] == pictures[1]
+    assert [pictures[0][name][:5] for name in (".png", ".svg", ".pdf")] == [
+        b"\x89PNG\r",
+        b"<?xml",
+        b"%PDF-",
+    ]
 
 
 def test_standings_find_who_is_better_and_by_how_much():
@@ -280,7 +287,7 @@ def test_page_and_numbers_are_written(folder, tmp_path, monkeypatch):
     monkeypatch.setattr("pma_gym.pages.figures.DPI", 50)
     suite, results = folder
     out = tmp_path / "page"
-    page, ranks, incomplete = run_report(suite, results, out)
+    page, ranks, incomplete = run_report(suite, results, out, vector=True)
     assert page == out / PAGE and not incomplete
     assert "Displacement (mm)" in ranks.header
     column = ranks.header.index("Displacement (mm)")
@@ -289,6 +296,9 @@ def test_page_and_numbers_are_written(folder, tmp_path, monkeypatch):
     names = {"distributions.png", "profiles.png", "pressures.png"}
     assert names <= set(written)
     assert {"loops_displacement.png", "loops_rotation.png", NUMBERS, PAIRS, TEXT} <= set(written)
+    assert {name.replace(".png", form) for name in names for form in (".svg", ".pdf")} <= set(
+        written
+    )
     page = written[PAGE].decode()
     assert 'src="http' not in page
     assert page.count("data:image/png;base64") == 5

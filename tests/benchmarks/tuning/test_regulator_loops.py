@@ -112,6 +112,5 @@ def test_report_of_suite_pressure_has_every_loop_at_low_middle_and_high_pressure
     assert table.title.startswith("Triangle low, against 150 N: least margins")
     assert [row[0] for row in table.rows] == ["PID"]
     assert table.rows[0][-1] == "stable"
-    assert loop_plot(loops_there["triangle_low"], styles_of(leaderboard.labels)).startswith(
-        b"\x89PNG"
-    )
+    drawn = loop_plot(loops_there["triangle_low"], styles_of(leaderboard.labels))
+    assert [line.get_xdata().size > 1 for line in drawn.axes[0].get_lines()][0]
