@@ -230,8 +230,8 @@ def _interruptible(leave: Callable[[], None]) -> Iterator[None]:
     writer.setblocking(False)
 
     def watch() -> None:
-        while heard := reader.recv(1):
-            if heard[0] == signal.SIGINT and not over.wait(LONGEST_S):
+        while received := reader.recv(1):
+            if received[0] == signal.SIGINT and not over.wait(LONGEST_S):
                 leave()
                 sys.stderr.flush()
                 os._exit(INTERRUPTED)

@@ -45,7 +45,7 @@ __all__ = [
     "where",
 ]
 
-_PI = 3.141592653589793
+_TURNS = 95.0 * 2.0 * 3.141592653589793
 
 
 def where(condition, yes, no):
@@ -111,14 +111,13 @@ def cosine(value):
 
     Absolute error below 1e-11 for |value| <= 1e4, in half of the arithmetic of `cos`. Working with
     u = 1 - cos keeps the digits where u is small: doubling the angle turns u into 2 u (2 - u).
-    Beyond 300 rad, where the series ends, whole turns are taken off first.
+    The series ends at 300 rad: 95 turns are taken off first, as often as they fit.
 
     >>> import math
     >>> max(abs(cosine(0.5 * i) - math.cos(0.5 * i)) for i in range(-20000, 20001)) < 1e-11
     True
     """
-    turns = floor(value * (0.5 / _PI) + 0.5)
-    z = where(abs(value) < 300.0, value, value - 2.0 * _PI * turns) * (1.0 / 256.0)
+    z = (value - _TURNS * floor(value * (1.0 / _TURNS) + 0.5)) * (1.0 / 256.0)
     square = z * z
     rest = 1.0 - square * (1.0 / 182.0) * (1.0 - square * (1.0 / 240.0))
     rest = 1.0 - square * (1.0 / 90.0) * (1.0 - square * (1.0 / 132.0) * rest)

@@ -32,8 +32,8 @@ def ranges(columns: Iterable[Iterable[float | None]]) -> str:
     for number, column in enumerate(islice(columns, _MOST_RANGES), start=1):
         values = np.array([np.nan if value is None else value for value in column], float)
         there = values[np.isfinite(values)]
-        held = f"{there.min():.4g} to {there.max():.4g}" if there.size else "no number"
-        said.append(f"column {number} holds {held}")
+        content = f"{there.min():.4g} to {there.max():.4g}" if there.size else "no number"
+        said.append(f"column {number} holds {content}")
     return ", ".join(said)
 
 
