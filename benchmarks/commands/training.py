@@ -39,9 +39,7 @@ def train(
             help="displacement, rotation, exercise, isotonic_exercise or profile_exercise."
         ),
     ],
-    preset: Annotated[
-        str, typer.Option(help="Name of a preset, or path of a .yml file of one's own.")
-    ] = "increment",
+    preset: Annotated[str, typer.Option(help="A preset, or a .yml file's path.")] = "increment",
     seed: Annotated[int, typer.Option(min=0, help="Same seed, same policy.")] = 0,
     seeds: Annotated[
         int, typer.Option(min=1, help="So many seeds from --seed on, a folder each.")
@@ -58,13 +56,11 @@ def train(
     patience: Annotated[
         int, typer.Option(min=0, help="Validations without progress, then end; 0: never.")
     ] = 0,
-    ship: Annotated[
-        bool, typer.Option("--ship", help="Write one seed's policy where the package's lie too.")
-    ] = False,
+    ship: Annotated[bool, typer.Option("--ship", help="Put the policy into the package.")] = False,
     jobs: Jobs = 1,
     executor: ExecutorOption = LOCAL,
 ) -> None:
-    """Train policies on stations that no suite has; an interrupted training goes on."""
+    """Train policies on stations of no suite; an interrupted training goes on."""
     usual = RESULTS / "training" / f"{Path(preset).stem}-{algo}"
     folder = out or usual / f"{task}-{seed}"
     with _failures_in_words(folder):
