@@ -20,7 +20,7 @@ from stable_baselines3.common.base_class import BaseAlgorithm
 
 from benchmarks.runner.damaged_results import reason, say_damaged
 from benchmarks.training.averaging import WeightAverage
-from controllers.policies.tensor_header import LARGEST_HEADER, check_header
+from controllers.policies.tensors import LARGEST_HEADER, check_header
 from pma_gym.document_shape import check_shape
 from pma_gym.documents import read_json
 from pma_gym.limits import check_limit

@@ -42,11 +42,10 @@ from benchmarks.runner.rollout import Rollout, rollout
 from benchmarks.suites.frozen import frozen_suite
 from benchmarks.suites.stations import draw_station
 from benchmarks.suites.suite import FrozenSuite
-from benchmarks.tuning.choice import chosen
-from benchmarks.tuning.cost import TARGETS, VARIATION_WEIGHT_S_PER_V
+from benchmarks.tuning.cost import TARGETS, VARIATION_WEIGHT_S_PER_V, chosen
 from benchmarks.tuning.tune import CONTROLLERS as TUNED
 from controllers import CONTROLLERS
-from controllers.design.designs import KINDS, SCHEMA, loop_name
+from controllers.design.designs import DESIGN_SCHEMA, KINDS, loop_name
 from pma_gym.document_shape import check_shape
 from pma_gym.documents import read_json
 from pma_gym.envs import PMAEnv
@@ -323,7 +322,7 @@ def _training(suite: FrozenSuite, number: int) -> Model:
 
 
 def _read(path: Path) -> dict[str, Any]:
-    document = {"schema": SCHEMA, "controllers": {}, "provenance": {}}
+    document = {"schema": DESIGN_SCHEMA, "controllers": {}, "provenance": {}}
     if path.exists():
         try:
             content = read_json(path)
@@ -333,8 +332,8 @@ def _read(path: Path) -> dict[str, Any]:
             raise DesignError(
                 f"{path} is no file of settings ({error}); delete it or name another"
             ) from error
-    if document["schema"] != SCHEMA:
-        raise DesignError(f"{path} must have schema {SCHEMA}; delete it or name another")
+    if document["schema"] != DESIGN_SCHEMA:
+        raise DesignError(f"{path} must have schema {DESIGN_SCHEMA}; delete it or name another")
     return document
 
 

@@ -45,12 +45,10 @@ from benchmarks.executors.choice import local
 from benchmarks.executors.executor import run_all
 from benchmarks.executors.failures import ProcessDied
 from benchmarks.files import write_text
-from benchmarks.tuning.choice import chosen
-from benchmarks.tuning.cost import Cost
-from benchmarks.tuning.finished_rows import KeptRows, name_of
-from benchmarks.tuning.job import Job
-from benchmarks.tuning.loop import lambda_tuning
-from controllers.design.gains import GAINS_FILE, SCHEMA, Gains, column_names
+from benchmarks.tuning.cost import Cost, chosen
+from benchmarks.tuning.loop_margins import lambda_tuning
+from benchmarks.tuning.tuning_task import Job, KeptRows, name_of
+from controllers.design.designs import GAINS_FILE, GAINS_SCHEMA, Gains, column_names
 from controllers.feedforward_pid import FeedforwardPID
 from controllers.pid import PID
 from pma_gym.document_shape import Whole, check_shape
@@ -252,18 +250,18 @@ def _provenance(model: Model, seed: int) -> dict[str, Any]:
 
 def _read(path: Path) -> dict[str, Any]:
     if not path.exists():
-        return {"schema": SCHEMA, "provenance": {}, "models": {}}
+        return {"schema": GAINS_SCHEMA, "provenance": {}, "models": {}}
     try:
         document = read_json(path)
         check_shape(document, {"schema": Whole()})
-        if document["schema"] == SCHEMA:
+        if document["schema"] == GAINS_SCHEMA:
             check_shape(document, {"provenance": dict, "models": {"*": dict}})
             return document
     except (ValueError, KeyError, TypeError) as error:
         raise ValueError(
             f"{path} is no file of gains ({error}); delete it or name another"
         ) from error
-    raise ValueError(f"{path} must have schema {SCHEMA}; delete it or name another")
+    raise ValueError(f"{path} must have schema {GAINS_SCHEMA}; delete it or name another")
 
 
 def _write(path: Path, document: dict[str, Any]) -> None:

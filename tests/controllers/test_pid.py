@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from controllers import CONTROLLERS, PID, FeedforwardPID
-from controllers.design.gains import Gains, scheduled_gains
+from controllers.design.designs import Gains, scheduled_gains
 from controllers.models.voltage import nominal_offset
 from pma_gym.plant.model import load_model
 from pma_gym.tasks import EVERY_TASK

@@ -11,9 +11,9 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from benchmarks.remake.versions import model_digest
 from benchmarks.runner.fingerprint import ROOT
 from benchmarks.suites.frozen import frozen_suite, suite_names
+from benchmarks.suites.versions import model_digest
 from benchmarks.tuning.design import designable
 
 MODEL = Path("pma_gym/models/station.toml")
@@ -118,7 +118,7 @@ def _policies(workers: Sequence[str]) -> Iterable[tuple[str, ...]]:
 TABLES = (Path("benchmarks/identification"), Path("pma_gym/data/serres2008"))
 """What the station is identified from, and by."""
 
-VERSIONS = "benchmarks.remake.versions"
+VERSIONS = "benchmarks.suites.versions"
 """Module that gives suites a new version where their stations are others."""
 
 
