@@ -121,7 +121,7 @@ docs: $(FULL) ## Build the documentation into site/.
 build: $(FULL) ## Build wheels and sdists of pma-gym and pma-gym-bench into dist/.
 	rm -rf dist
 	$(BIN)/python -m build --outdir dist . > /dev/null
-	$(BIN)/python -m benchmarks.packaging.bench_wheel dist
+	$(BIN)/python -m benchmarks.bench_wheel dist
 	ls -l dist
 
 # Outside the clone, so that nothing of it can stand in for what a wheel lacks.

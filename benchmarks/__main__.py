@@ -3,18 +3,7 @@
 import os
 import sys
 
-from benchmarks.commands import (
-    dissertation,
-    exercise,
-    hidden_effects,
-    remake,
-    reproduction,
-    settings,
-    simulator,
-    suites,
-    targets,
-    training,
-)
+from benchmarks.commands import dissertation, exercise, hidden_effects, runs, settings, training
 from pma_gym.cli.options import StrictTyper
 from pma_gym.terminal import safe_streams
 
@@ -29,13 +18,9 @@ app = StrictTyper(
     invoke_without_command=True,
 )
 # In the order in which --help lists the commands.
-reproduction.register(app)
-suites.register(app)
-targets.register(app)
+runs.register(app)
 dissertation.register(app)
 settings.register(app)
-remake.register(app)
-simulator.register(app)
 hidden_effects.register(app)
 training.register(app)
 exercise.register(app)

@@ -3,7 +3,7 @@
 from typing import TYPE_CHECKING, Protocol
 
 from controllers.controller import Reference
-from controllers.design.gains import Gains
+from controllers.design.designs import Gains
 from controllers.improved_feedforward import ImprovedFeedforward
 from pma_gym.envs import StationInfo
 

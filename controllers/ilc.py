@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import binary_opening
 
 from controllers.controller import Reference
-from controllers.design.designs import designed
-from controllers.design.gains import scheduled_gains
+from controllers.design.designs import designed, scheduled_gains
 from controllers.feedforward_pid import FeedforwardPID
 from controllers.models.lifted_model import LiftedModel
 from controllers.models.nominal_motion import NominalMotion, nominal_motion

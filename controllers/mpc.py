@@ -9,8 +9,8 @@ from controllers.controller import Reference
 from controllers.design.designs import designed
 from controllers.design.quadratic_program import BoundedProgram
 from controllers.models.linear_motion import linear_motion
-from controllers.models.model_key import ModelKey
 from controllers.models.nominal_motion import nominal_motion
+from controllers.models.operating_range import ModelKey
 from controllers.models.voltage import VOLTAGE_LIMIT
 from controllers.observers.filter_bank import DampingBank
 from controllers.observers.filter_bank_design import BankDesign, bank_design

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from controllers.controller import Reference
-from controllers.design.gains import Gains, scheduled_gains
+from controllers.design.designs import Gains, scheduled_gains
 from controllers.models.voltage import VOLTAGE_LIMIT, nominal_offset
 from pma_gym.envs import Measurement, StationInfo
 

@@ -15,7 +15,7 @@ from trial_plots import controllers_plot, environment_plot, measured_plot, rig_p
 
 import pma_gym  # noqa: F401 - registers the environments
 from benchmarks.exercise.choice import Choice
-from benchmarks.exercise.job import run_exercise
+from benchmarks.exercise.choose_device import run_exercise
 from benchmarks.exercise.profile import read_profile
 from benchmarks.hidden_effects.evaluation.pictures import naming_picture
 from controllers import SerresReplay

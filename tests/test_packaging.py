@@ -9,8 +9,7 @@ from pathlib import Path
 import pytest
 
 import pma_gym
-from benchmarks.packaging.bench_wheel import write_tree
-from benchmarks.packaging.rename_packages import renamed_source, renamed_strings
+from benchmarks.bench_wheel import renamed_source, renamed_strings, write_tree
 from pma_gym import demo
 from pma_gym.data.serres2008 import load_table
 

@@ -31,7 +31,7 @@ def register(app: typer.Typer) -> None:
 
 def profiles(out: Out) -> None:
     """Regenerate the dissertation's voltage profiles (tables I4-I20)."""
-    from benchmarks.dissertation.profiles import run_profiles
+    from benchmarks.dissertation import run_profiles
 
     print(f"{run_profiles(out)} rows in {out}")
 
@@ -51,7 +51,7 @@ def measured(
     recompute: Recompute = False,
 ) -> None:
     """Diagnose the dissertation's tables I2 and I3; an interrupted run goes on where it stopped."""
-    from benchmarks.measured.job import run_measured, write_trials
+    from benchmarks.measured.diagnose_tables import run_measured, write_trials
     from benchmarks.measured.rounds import MOST_ROUNDS
 
     for folder, option in ((out, "--out"), (write, "--write")):
@@ -80,7 +80,7 @@ def voltages(
     ] = "station",
 ) -> None:
     """Write a feed-forward's voltages for a real rig as CSV."""
-    from benchmarks.dissertation.voltages import Order, run_voltages
+    from benchmarks.dissertation import Order, run_voltages
 
     try:
         rows = run_voltages(Order(controller, task, pressure, rate, model), out)
@@ -91,14 +91,14 @@ def voltages(
 
 def studies(out: OptionalOut = None) -> None:
     """Recompute the dissertation's regressions and variance tables beside the printed ones."""
-    from benchmarks.dissertation.studies import run_studies
+    from benchmarks.dissertation import run_studies
 
     run_studies(out)
 
 
 def identify(out: Out, jobs: Jobs = 2) -> None:
     """Fit the station's model from tables I2 and I3; judge it on left-out pressures and I1."""
-    from benchmarks.identification.job import run_identify
+    from benchmarks.identification.identify import run_identify
 
     try:
         run_identify(out, jobs)

@@ -50,7 +50,7 @@ def exercise(
 ) -> None:
     """Show which moments muscles of which size give, and the smallest for a prescription."""
     from benchmarks.exercise.choice import Choice, ChoiceError
-    from benchmarks.exercise.job import run_exercise
+    from benchmarks.exercise.choose_device import run_exercise
     from benchmarks.exercise.profile import ProfileError, held, read_profile
     from pma_gym.plant.exercise_device.prescription import UnreachableError
     from pma_gym.terminal import SafeConsole
@@ -76,7 +76,7 @@ def safety(
     executor: ExecutorOption = LOCAL,
 ) -> None:
     """Count how often adversarial commands hurt the exercise's operator; a minute or two."""
-    from benchmarks.exercise.safety_layer.job import SafetyError, run_safety
+    from benchmarks.exercise.safety_layer import SafetyError, run_safety
     from pma_gym.terminal import SafeConsole
 
     try:

@@ -1,12 +1,14 @@
-"""The commands that search controllers' settings: `tune` and `design`."""
+"""The commands about settings and the simulator: `tune`, `design`, `remake` and `speed`."""
 
 import sys
+from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from benchmarks.commands.options import (
     INTERRUPTED,
+    RESULTS,
     Jobs,
     OptionalOut,
     listed,
@@ -23,6 +25,82 @@ def register(app: typer.Typer) -> None:
     app.command(epilog="Example: python -m benchmarks design --controllers lqg --out designs.toml")(
         design
     )
+    app.command(epilog="Example: python -m benchmarks remake --list")(remake)
+    app.command(epilog="Example: python -m benchmarks speed --quick --only single")(speed)
+
+
+def speed(
+    json_file: Annotated[
+        Path | None, typer.Option("--json", help="File for all figures, in a folder that exists.")
+    ] = None,
+    check: Annotated[
+        bool,
+        typer.Option(help="Only ratios that hold everywhere; exit code 1 if one does not."),
+    ] = False,
+    only: Annotated[
+        str, typer.Option(help="Rows by commas, such as single or 'batch/own*'; else all.")
+    ] = "",
+    quick: Annotated[bool, typer.Option(help="A smoke run, whose figures say little.")] = False,
+) -> None:
+    """Measure this package's speed beside other simulators' (`make peers` installs them)."""
+    from benchmarks.speed.run import RequestError, run_speed
+
+    try:
+        code = run_speed(json_file, check, only, quick)
+    except RequestError as error:
+        refuse(error)
+    raise typer.Exit(code)
+
+
+def remake(
+    only: Annotated[str, typer.Option(help="Steps by commas, see --list; else all.")] = "",
+    without: Annotated[str, typer.Option(help="Steps that are left out, by commas.")] = "",
+    steps: Annotated[
+        bool, typer.Option("--list", help="List the steps and what is left, and stop.")
+    ] = False,
+    table: Annotated[
+        bool, typer.Option("--table", help="Show figures that moved since it began, and stop.")
+    ] = False,
+    jobs: Jobs = 2,
+    out: Annotated[
+        Path, typer.Option(help="Folder of what is done, old figures, and the table.")
+    ] = RESULTS / "remake",
+) -> None:
+    """Make all anew that depends on the station: model, gains, designs, policies, scores, tables.
+
+    It goes on where it stopped, and ends with a table of old and new figures.
+    """
+    from benchmarks.remake import Remake
+    from benchmarks.remake_steps import chain
+    from pma_gym.terminal import SafeConsole
+
+    every = chain(jobs)
+    names = [step.name for step in every]
+    for option, given in (("--only", listed(only)), ("--without", listed(without))):
+        for name in given:
+            if name not in names:
+                refuse(ValueError(f"{option} takes {', '.join(names)}, got {name!r}"))
+    chosen = [
+        step
+        for step in every
+        if (not only or step.name in listed(only)) and step.name not in listed(without)
+    ]
+    job = Remake(chosen, out, SafeConsole())
+    if steps:
+        left = {step.name for step in job.left()}
+        for step in every:
+            said = "left" if step.name in left else "done" if step in chosen else "left out"
+            print(f"{step.name:10} {said:9} {step.hours:5.1f} h  {step.makes}")
+        return
+    if table:
+        job.table()
+        return
+    try:
+        complete = job.go()
+    except KeyboardInterrupt:
+        print("Interrupted; run it again, it goes on where it stopped", file=sys.stderr)
+        raise typer.Exit(INTERRUPTED) from None
+    raise typer.Exit(0 if complete else 1)
 
 
 def tune(

@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import LogLocator, NullFormatter
 
-from benchmarks.exercise.answer import Answer
+from benchmarks.exercise.profile import Answer
 from pma_gym.pages.figures import picture, png
 from pma_gym.plant.exercise_device.device import (
     FULL_ANGLE,

@@ -12,7 +12,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from pma_gym.codegen.rebinding import as_numpy
+from pma_gym.codegen.trace import as_numpy
 from pma_gym.data.serres2008 import load_table
 from pma_gym.effects.muscle.damping import symmetric_damping
 from pma_gym.plant.model import Model

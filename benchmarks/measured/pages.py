@@ -2,14 +2,14 @@
 
 import numpy as np
 
-from benchmarks.measured.replays import PHASE_NAMES
-from benchmarks.measured.result import Measured
+from benchmarks.measured.steps import PHASE_NAMES
 from benchmarks.measured.tables import (
     COLUMNS,
     HELD_HEADER,
     NOT_DETECTABLE_HEADER,
     REPLAY_HEADER,
     TARGET_MM,
+    Measured,
     error_rows,
     experiment_text,
     held_rows,

@@ -17,7 +17,7 @@ from benchmarks.runner.provenance import check_run, finished_rows, read_run
 from benchmarks.suites.suite import Entry, FrozenSuite, SuiteError
 from controllers import CONTROLLERS
 from pma_gym.envs import StationInfo
-from pma_gym.pages.notebook import notebook_html
+from pma_gym.pages.figures import notebook_html
 from pma_gym.tasks import ISOTONIC, TASKS, infeasibility_reason
 
 LOOP_TASKS = (*TASKS, *ISOTONIC)

@@ -7,7 +7,7 @@ import numpy as np
 
 from benchmarks.report.standings import Standing, Standings
 from benchmarks.report.statistics import Interval
-from benchmarks.suites.target import FIGURES, Target
+from benchmarks.suites.suite import FIGURES, Target
 
 UNITS = {
     "half_width": "%",

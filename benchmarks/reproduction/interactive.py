@@ -7,10 +7,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.report.plot_style import controller_styles
-from benchmarks.reproduction.plots import LABELS, measured_lines, pictured_pressures
+from benchmarks.reproduction.plots import (
+    LABELS,
+    QUANTITY_LABELS,
+    measured_lines,
+    pictured_pressures,
+)
 from benchmarks.reproduction.replay import QUANTITIES, all_replay_errors
 from benchmarks.reproduction.results import Results
-from benchmarks.reproduction.summary_plots import QUANTITY_LABELS
 from benchmarks.runner.phase_score import PHASES, UNITS, measured_score
 from pma_gym.data.trial import Trial
 from pma_gym.data.trial_schedule import SCHEDULES

@@ -4,11 +4,15 @@ from collections.abc import Mapping
 from typing import Any
 
 from benchmarks.reproduction.interactive import rmse_figure, tracking_figure
-from benchmarks.reproduction.plots import actual_against_ideal_plot, tracking_plot
+from benchmarks.reproduction.plots import (
+    actual_against_ideal_plot,
+    replay_plot,
+    rmse_plot,
+    tracking_plot,
+)
 from benchmarks.reproduction.replay import all_replay_errors
 from benchmarks.reproduction.replay_page import replay_blocks
 from benchmarks.reproduction.results import Results
-from benchmarks.reproduction.summary_plots import replay_plot, rmse_plot
 from benchmarks.reproduction.tables import regression_table, rmse_table, summary_table
 from benchmarks.runner.phase_score import PHASES
 from pma_gym.pages.document import Block, Heading, Paragraph, Picture, TextTable

@@ -4,17 +4,62 @@ from collections.abc import Sequence
 from statistics import fmean
 
 from benchmarks.reproduction.interactive import replay_figure
-from benchmarks.reproduction.reading_page import reading_blocks
 from benchmarks.reproduction.replay import ReplayError, all_replay_errors, summarise, table_angle
 from benchmarks.reproduction.results import Results
-from benchmarks.reproduction.score_parts import parts_explained, parts_table
-from benchmarks.reproduction.tables import replay_table
-from benchmarks.runner.phase_score import measured_score
+from benchmarks.reproduction.rotation_reading import reading_blocks
+from benchmarks.reproduction.tables import MISSING, RULE, replay_table
+from benchmarks.runner.phase_score import UNITS, PhaseScore, measured_score
 from pma_gym.pages.document import Block, Heading, Paragraph, Picture, TextTable
 from pma_gym.plant.model import shipped_models
 
+PARTS = ("rmse", "line_error", "scatter")
+"""Attributes of a `PhaseScore`: RMSE^2 = line_error^2 + scatter^2."""
+
+_NAMES = ("RMSE", "line part", "scatter")
+
+
+def parts_table(results: Results, task: str, phase: str) -> TextTable:
+    """RMSE, its part in the regression line and its part about it, measured and replayed."""
+    unit, replay = UNITS[task], results.suite.goals.replay
+    pressures = results.suite.pressures_kpa[task]
+    measured = [measured_score(task, phase, pressure) for pressure in pressures]
+    model = results.suite.models[0]
+    simulated = [results.phase(model, replay, task, pressure, phase) for pressure in pressures]
+    rows = [
+        [f"{pressure:g}", *_cells(mine), *_cells(theirs)]
+        for pressure, mine, theirs in zip(pressures, measured, simulated, strict=True)
+    ]
+    known = [score for score in simulated if score is not None]
+    means = ["mean", *_means(measured), *(_means(known) if known else [""] * len(PARTS))]
+    header = ["Pressure (kPa)"]
+    header += [f"{who} | {name} ({unit})" for who in ("Measured", "Simulated") for name in _NAMES]
+    part = "Displacement" if task == phase else f"Rotation, phase {phase}"
+    return TextTable(f"{part}: the two parts of the RMSE", header, [*rows, RULE, means])
+
+
+def parts_explained() -> Paragraph:
+    """Explain the two parts of the RMSE."""
+    return Paragraph(
+        "An RMSE against the ideal has two parts: the line part, the root mean square over the "
+        "trial of its regression line less the ideal, and the scatter, the root mean square about "
+        "that line. RMSE² = line part² + scatter². Tables 20-22 and 24-30 give both for every "
+        "measured trial. A simulation with too little scatter can have the measured RMSE only with "
+        "a line that is wrong; the two parts show that."
+    )
+
+
+def _cells(score: PhaseScore | None) -> list[str]:
+    if score is None:
+        return [MISSING, "", ""]
+    return [f"{getattr(score, name):.3f}" for name in PARTS]
+
+
+def _means(scores: list[PhaseScore]) -> list[str]:
+    return [f"{fmean(getattr(score, name) for score in scores):.3f}" for name in PARTS]
+
+
 _UNITS = {"slope": "mm/s", "intercept": "mm", "rmse": "mm"}
-_NAMES = {"slope": "slope", "intercept": "intercept", "rmse": "RMSE"}
+_MEASURES = {"slope": "slope", "intercept": "intercept", "rmse": "RMSE"}
 
 
 def replay_blocks(results: Results) -> list[Block]:
@@ -60,8 +105,8 @@ def displacement_verdict(results: Results, errors: Sequence[ReplayError]) -> str
     """State whether the model predicts displacement better than the simple prediction."""
     line = results.suite.goals.simple_prediction
     got = summarise(errors).absolute
-    better = [_NAMES[name] for name in _NAMES if got[name] < line[name]]
-    worse = [_NAMES[name] for name in _NAMES if got[name] >= line[name]]
+    better = [_MEASURES[name] for name in _MEASURES if got[name] < line[name]]
+    worse = [_MEASURES[name] for name in _MEASURES if got[name] >= line[name]]
     if not worse:
         return "**The model predicts all three figures better than the simple prediction.**"
     if not better:
@@ -78,7 +123,7 @@ def _against_simple_prediction(results: Results, errors: Sequence[ReplayError]) 
     means = summarise(errors)
     rows = [
         [
-            f"{_NAMES[name]} ({unit})",
+            f"{_MEASURES[name]} ({unit})",
             f"{means.signed[name]:+.3f}",
             f"{means.absolute[name]:.3f}",
             f"{line[name]:.2f}",

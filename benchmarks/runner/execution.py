@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from typing import Any, cast
 
 from benchmarks.executors.executor import Executor, run_all
 from benchmarks.executors.failures import ProcessDied
@@ -111,9 +112,8 @@ def execute(
 
         def keep(index: int, result: object) -> None:
             case = missing[index]
-            row = failed_row(case, result) if isinstance(result, BaseException) else result
-            assert isinstance(row, dict)
-            row = {"key": todo.keys[case.spec.name]} | row
+            made = failed_row(case, result) if isinstance(result, BaseException) else result
+            row = {"key": todo.keys[case.spec.name]} | cast("dict[str, Any]", made)
             # What other code made goes with its row.
             for form in TRACES:
                 trace_file(case, out, form).unlink(missing_ok=True)

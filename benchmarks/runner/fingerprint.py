@@ -25,7 +25,7 @@ SOURCES = (
     "benchmarks/executors/lifetime.py",
     "benchmarks/executors/work.py",
     "benchmarks/runner/controller_process.py",
-    "benchmarks/suites/feasibility.py",
+    "benchmarks/suites/stations.py",
     "benchmarks/runner/case.py",
     "benchmarks/runner/figures.py",
     "benchmarks/runner/phase_score.py",

@@ -12,8 +12,15 @@ from typing import Any
 from benchmarks.runner.controller_spec import ControllerSpec
 from benchmarks.suites.recipe import Recipe, parse_recipe
 from benchmarks.suites.reproduction import GOAL_FIGURES, Goals, ReproductionSuite
-from benchmarks.suites.suite import NOMINAL, SUITES, Entry, EpisodePlan, FrozenSuite, SuiteError
-from benchmarks.suites.target import parse_target
+from benchmarks.suites.suite import (
+    NOMINAL,
+    SUITES,
+    Entry,
+    EpisodePlan,
+    FrozenSuite,
+    SuiteError,
+    parse_target,
+)
 from pma_gym.document_shape import ListOf, Maybe, Real, Whole, check_shape
 from pma_gym.documents import DocumentError, is_file, read_toml
 from pma_gym.engine.options import parse_options

@@ -1,14 +1,17 @@
 """Cost of gains: whole trials with sensor noise on several stations, and the loop's margin."""
 
+import difflib
+import fnmatch
 import math
+from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
 
-from benchmarks.tuning.job import Job
-from benchmarks.tuning.loop import Loop
+from benchmarks.tuning.loop_margins import Loop
+from benchmarks.tuning.tuning_task import Job
 from controllers.controller import Reference
-from controllers.design.gains import Gains
+from controllers.design.designs import Gains
 from controllers.feedforward_pid import FeedforwardPID
 from controllers.models.nominal_motion import NominalMotion, nominal_motion
 from controllers.pid import PID
@@ -16,6 +19,33 @@ from pma_gym.effects.effect import Value
 from pma_gym.envs import PMAEnv, StationInfo
 from pma_gym.plant.model import Model
 from pma_gym.units import SI_FACTORS
+
+
+def chosen(names: Iterable[str], only: str) -> list[str]:
+    """Names that patterns match, each once, in their own order.
+
+    >>> chosen(["hard/displacement", "hard/rotation", "robust/rotation"], "*/rotation")
+    ['hard/rotation', 'robust/rotation']
+
+    Args:
+        names: what there is.
+        only: patterns as of file names, by commas.
+    Raises:
+        ValueError: a pattern matches nothing.
+    """
+    known = list(dict.fromkeys(names))
+    wanted: set[str] = set()
+    for pattern in (part.strip() for part in only.split(",")):
+        matching = fnmatch.filter(known, pattern)
+        if not matching:
+            near = difflib.get_close_matches(pattern, known, 1)
+            hint = f"; did you mean {near[0]}?" if near else ""
+            raise ValueError(
+                f"only must match a table, got {pattern!r}; tables: {', '.join(known)}{hint}"
+            )
+        wanted.update(matching)
+    return [name for name in known if name in wanted]
+
 
 TARGETS = {
     "extension": 0.10 * SI_FACTORS["mm"],

@@ -41,11 +41,10 @@ from benchmarks.runner.rollout import Rollout, rollout
 from benchmarks.suites.frozen import frozen_suite
 from benchmarks.suites.stations import draw_station
 from benchmarks.suites.suite import FrozenSuite
-from benchmarks.tuning.choice import chosen
-from benchmarks.tuning.cost import TARGETS, VARIATION_WEIGHT_S_PER_V
+from benchmarks.tuning.cost import TARGETS, VARIATION_WEIGHT_S_PER_V, chosen
 from benchmarks.tuning.tune import CONTROLLERS as TUNED
 from controllers import CONTROLLERS
-from controllers.design.designs import KINDS, SCHEMA, loop_name, read_settings
+from controllers.design.designs import DESIGN_SCHEMA, KINDS, loop_name, read_settings
 from pma_gym.document_shape import Real, check_shape
 from pma_gym.envs import PMAEnv
 from pma_gym.metrics import rmse
@@ -326,7 +325,7 @@ def _read(path: Path) -> dict[str, Any]:
     if not path.exists():
         return {}
     try:
-        tables = read_settings(path, SCHEMA, "design")
+        tables = read_settings(path, DESIGN_SCHEMA, "design")
         check_shape(tables, {"*": {"*": {"*": {"provenance": str, "*?": Real()}}}})
     except ValueError as error:
         raise DesignError(
@@ -355,4 +354,4 @@ def _write(
     )
     loops = document.setdefault(problem.controller, {})
     loops.setdefault(result.loop, {})[problem.kind] = {"provenance": provenance, **result.values}
-    write_text(out, toml_document(HEAD, SCHEMA, document))
+    write_text(out, toml_document(HEAD, DESIGN_SCHEMA, document))

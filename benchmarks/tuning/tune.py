@@ -44,13 +44,16 @@ from benchmarks.executors.choice import local
 from benchmarks.executors.executor import run_all
 from benchmarks.executors.failures import ProcessDied
 from benchmarks.files import toml_document, write_text
-from benchmarks.tuning.choice import chosen
-from benchmarks.tuning.cost import Cost
-from benchmarks.tuning.finished_rows import KeptRows, name_of
-from benchmarks.tuning.job import Job
-from benchmarks.tuning.loop import lambda_tuning
-from controllers.design.designs import read_settings
-from controllers.design.gains import GAINS_FILE, SCHEMA, Gains, column_names
+from benchmarks.tuning.cost import Cost, chosen
+from benchmarks.tuning.loop_margins import lambda_tuning
+from benchmarks.tuning.tuning_task import Job, KeptRows, name_of
+from controllers.design.designs import (
+    GAINS_FILE,
+    GAINS_SCHEMA,
+    Gains,
+    column_names,
+    read_settings,
+)
 from controllers.feedforward_pid import FeedforwardPID
 from controllers.pid import PID
 from pma_gym.document_shape import check_shape
@@ -123,7 +126,7 @@ def run_tune(
         for kind, controllers in kinds.items():
             table = {"provenance": _provenance(known, seed)} | controllers
             document.setdefault(known.name, {}).setdefault(loop, {})[kind] = table
-    write_text(out, toml_document(HEAD, SCHEMA, document))
+    write_text(out, toml_document(HEAD, GAINS_SCHEMA, document))
     kept.forget()
     return True
 
@@ -243,7 +246,7 @@ def _read(path: Path) -> dict[str, Any]:
     if not path.exists():
         return {}
     try:
-        tables = read_settings(path, SCHEMA, "tune")
+        tables = read_settings(path, GAINS_SCHEMA, "tune")
         check_shape(tables, {"*": {"*": {"*": dict}}})
     except ValueError as error:
         raise ValueError(

@@ -6,8 +6,14 @@ from typing import NamedTuple
 import numpy as np
 
 from controllers.controller import Reference
-from controllers.exercise.joint_speed import JointSpeed
-from controllers.exercise.resistance import ANGLES, Arrival, Resistance, exercise_of, volts_of
+from controllers.exercise.resistance import (
+    ANGLES,
+    Arrival,
+    JointSpeed,
+    Resistance,
+    exercise_of,
+    volts_of,
+)
 from controllers.exercise.scheduled_pressure import schedule
 from pma_gym.envs import Measurement, StationInfo
 

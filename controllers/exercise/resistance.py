@@ -7,9 +7,36 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pma_gym.envs import StationInfo
+from pma_gym.envs import Measurement, StationInfo
 from pma_gym.plant.exercise_device.device import FULL_ANGLE, own_device, resistive_moment
 from pma_gym.tasks import Exercise
+
+
+class JointSpeed:
+    """The extension's change over the nominal pulley's radius, through a filter of the first order.
+
+    The LVDT is finer than the potentiometer. What the cable stretches is taken for no motion.
+
+    Args:
+        station: the station as the controller knows it.
+        time_constant: of the filter (s).
+
+    Attributes:
+        speed: of late (rad/s).
+    """
+
+    def __init__(self, station: StationInfo, time_constant: float) -> None:
+        self._rate = 1.0 / (station.period * station.model.parameters["rotor"].radius)
+        self._kept = math.exp(-station.period / time_constant)
+        self.speed = self._extension = 0.0
+
+    def update(self, reading: Measurement) -> float:
+        """Take a reading; the speed (rad/s)."""
+        rate = self._rate * (reading.extension - self._extension)
+        self._extension = reading.extension
+        self.speed = rate + self._kept * (self.speed - rate)
+        return self.speed
+
 
 PRESSURES = np.arange(0.0, 601e3, 25e3)
 """Pressures of the table (Pa): as far as the shipped models allow."""

@@ -3,8 +3,7 @@
 from typing import NamedTuple
 
 from controllers.controller import Reference
-from controllers.exercise.joint_speed import JointSpeed
-from controllers.exercise.resistance import Arrival, Resistance, exercise_of, volts_of
+from controllers.exercise.resistance import Arrival, JointSpeed, Resistance, exercise_of, volts_of
 from pma_gym.envs import Measurement, StationInfo
 
 

@@ -6,12 +6,17 @@ import numpy as np
 
 from controllers.controller import Reference
 from controllers.design.designs import must_give_a_position
-from controllers.models.attainable_reference import begun_late, jumps, without_jumps
 from controllers.models.inverse import Inverse, inverse_of
 from controllers.models.local_model import LocalModel, Stroke
-from controllers.models.model_key import ModelKey
-from controllers.models.nominal_rollout import improved, nominal_rollout, position_of
-from controllers.models.operating_range import sensor_of, stroke_along
+from controllers.models.nominal_rollout import (
+    begun_late,
+    improved,
+    jumps,
+    nominal_rollout,
+    position_of,
+    without_jumps,
+)
+from controllers.models.operating_range import ModelKey, sensor_of, stroke_along
 from pma_gym.envs import StationInfo
 
 VOLTAGES_KEPT = 128
@@ -27,7 +32,7 @@ class NominalMotion:
 
     The voltages aim at `planned`: the reference, but at rest until the first command is in force,
     and with a way as fast as the plant goes in place of a jump
-    (`controllers.models.attainable_reference`).
+    (`controllers.models.nominal_rollout`).
 
     Attributes:
         reference: the reference (m or rad by s).

@@ -6,11 +6,34 @@ from functools import lru_cache
 import numpy as np
 
 from controllers.models.local_model import Stroke, stroke_models
-from controllers.models.model_key import ModelKey
 from pma_gym.data.signals import SIGNALS
 from pma_gym.envs import StationInfo
 from pma_gym.plant import sensors
+from pma_gym.plant.model import Model
 from pma_gym.plant.plant import Plant
+from pma_gym.plant.program import structure
+
+
+class ModelKey:
+    """A nominal model that is equal to every other of the same laws and numbers: a key.
+
+    Args:
+        model: the model.
+    """
+
+    def __init__(self, model: Model) -> None:
+        self.model = model
+        self._key = (*structure(model), model.vector().tobytes())
+        self._hash = hash(self._key)
+
+    def __hash__(self) -> int:
+        """Of the laws and numbers."""
+        return self._hash
+
+    def __eq__(self, other: object) -> bool:
+        """Whether laws and numbers are the same."""
+        return isinstance(other, ModelKey) and self._key == other._key
+
 
 STROKES_KEPT = 64
 """Strokes whose local models a process keeps: one a pressure, task and control period."""

@@ -7,7 +7,7 @@ from typing import Any
 
 from generators.text import code, sections, table
 from pma_gym.effects.effect import Effect, signals
-from pma_gym.plant.forms.notation import Names, Notation
+from pma_gym.plant.forms.symbolic import Names, Notation
 from pma_gym.plant.model import Model, load_model
 from pma_gym.plant.rigs import RIGS
 

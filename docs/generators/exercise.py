@@ -3,8 +3,8 @@
 from pathlib import Path
 
 from benchmarks.exercise.choice import Choice
-from benchmarks.exercise.safety_layer.episodes import Safety
-from benchmarks.exercise.safety_layer.job import read_safety, safety_table, safety_text
+from benchmarks.exercise.safety_episodes import Safety
+from benchmarks.exercise.safety_layer import read_safety, safety_table, safety_text
 from benchmarks.exercise.tables import check_table, knee_table, makers_table, range_table
 from generators.text import table
 from pma_gym.pages.document import TextTable, to_markdown

@@ -5,8 +5,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from benchmarks.identification.judge import TARGETS
 from benchmarks.identification.measurements import station_limits
+from benchmarks.identification.station import TARGETS
 from generators.text import code, number, table
 from pma_gym.effects import CATALOGUE
 from pma_gym.effects.effect import Value

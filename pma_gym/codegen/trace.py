@@ -1,13 +1,59 @@
-"""Calls a law on traced values, and asks a graph what it consists of."""
+"""Calls a law on traced values, asks a graph what it consists of, and puts values in its place."""
 
-from collections.abc import Callable, Iterable, Sequence
+import types
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cache
 from operator import attrgetter
 from typing import Any
 
+import numpy as np
+
 from pma_gym.codegen.generic import sloping, where
 from pma_gym.codegen.graph import Value
-from pma_gym.codegen.rebinding import rebind
+
+
+def rebind(function: Callable, names: Mapping[str, Callable]) -> Callable:
+    """Return a copy of a function in which the calls of given names are replaced.
+
+    Args:
+        function: a law, or a generated function that calls laws.
+        names: replacements by name, such as {"where": numpy.where}.
+    Returns:
+        A new function of the same text.
+    """
+    return _rebind(function, names, {})
+
+
+def _rebind(
+    function: Callable, names: Mapping[str, Callable], done: dict[int, Callable]
+) -> Callable:
+    if id(function) in done:
+        return done[id(function)]
+    assert isinstance(function, types.FunctionType)
+    own = dict(function.__globals__)
+    fresh = types.FunctionType(
+        function.__code__, own, function.__name__, function.__defaults__, function.__closure__
+    )
+    done[id(function)] = fresh
+    for name in function.__code__.co_names:
+        value = own.get(name)
+        if name in names:
+            own[name] = names[name]
+        elif value is np:
+            own[name] = types.SimpleNamespace(**{**vars(np), **names})
+        elif isinstance(value, types.FunctionType):
+            own[name] = _rebind(value, names, done)
+    return fresh
+
+
+def as_numpy(function: Callable) -> Callable:
+    """Return a law for NumPy arrays.
+
+    >>> from pma_gym.effects.arithmetic import clip
+    >>> as_numpy(clip)(np.array([-1.0, 0.5, 2.0]), 0.0, 1.0).tolist()
+    [0.0, 0.5, 1.0]
+    """
+    return rebind(function, {"where": np.where, "exponential": np.exp})
 
 
 def trace(law: Callable, *arguments: Any, **named: Any) -> Any:  # noqa: ANN401
@@ -100,3 +146,22 @@ def _sort(value: Value) -> str:
     if value.kind == "integer" or any(operand.kind == "integer" for operand in value.operands):
         return "integer"
     return _COUNTED.get(value.operation, "choose")
+
+
+def substitute(outputs: Sequence[Value], given: Mapping[int, Value]) -> list[Value]:
+    """Return the outputs with some values replaced by others.
+
+    Args:
+        outputs: traced values.
+        given: new values by the `Value.id` of those that they replace.
+    Returns:
+        The outputs, made of the new values; what depends on none of them stays the same value.
+    """
+    replaced = dict(given)
+    for value in order(outputs):
+        if value.id in replaced:
+            continue
+        parts = [replaced[part.id] for part in value.operands]
+        same = all(a is b for a, b in zip(parts, value.operands, strict=True))
+        replaced[value.id] = value if same else value.graph.apply(value.operation, *parts)
+    return [replaced[value.id] for value in outputs]

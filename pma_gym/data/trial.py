@@ -161,8 +161,7 @@ class Trial:
     def _repr_html_(self) -> str:
         """What a notebook shows: the plot, and below it where the trial comes from."""
         from pma_gym.pages.document import Paragraph, Picture
-        from pma_gym.pages.figures import png
-        from pma_gym.pages.notebook import notebook_html
+        from pma_gym.pages.figures import notebook_html, png
 
         notes = "; ".join(f"{name}: {text}" for name, text in self.provenance.items())
         words = f"Trial: {len(self)} samples, {self.duration:.6g} s. {notes}"

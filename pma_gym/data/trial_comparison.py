@@ -50,8 +50,7 @@ class TrialComparison:
     def _repr_html_(self) -> str:
         """What a notebook shows: the figures, and the plot below them."""
         from pma_gym.pages.document import Picture, TextTable
-        from pma_gym.pages.figures import png
-        from pma_gym.pages.notebook import notebook_html
+        from pma_gym.pages.figures import notebook_html, png
 
         rows = [[name, _value(name, size)] for name, size in self.rmse.items()]
         table = TextTable(" and ".join(self.trials), ["Column", "RMSE"], rows)

@@ -19,8 +19,7 @@ from numpy.typing import NDArray
 
 from pma_gym.codegen.threads.sharing import linear_algebra_alone
 from pma_gym.data.trial import Trial
-from pma_gym.estimation.fitted import Fit, Round
-from pma_gym.estimation.least_squares import inverse, least
+from pma_gym.estimation.least_squares import Fit, Round, inverse, least
 from pma_gym.estimation.residuals import Residuals, Sums
 from pma_gym.integrator.equations import Interpolation
 from pma_gym.plant.compiled_model import DEFAULT_TOLERANCE

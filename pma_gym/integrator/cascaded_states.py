@@ -11,8 +11,7 @@ from dataclasses import dataclass
 
 from pma_gym.codegen.derivative import derivatives
 from pma_gym.codegen.graph import CHANGING, HELD, Value
-from pma_gym.codegen.substitute import substitute
-from pma_gym.codegen.trace import live_inputs, operation_counts
+from pma_gym.codegen.trace import live_inputs, operation_counts, substitute
 from pma_gym.integrator.equations import Equations, State
 
 DEAREST = 80

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from pma_gym.codegen.generic import square_root, where
 from pma_gym.codegen.graph import Value
-from pma_gym.codegen.substitute import substitute
+from pma_gym.codegen.trace import substitute
 from pma_gym.integrator.equations import Equations, Event, State
 from pma_gym.integrator.exponential_rosenbrock import Step
 

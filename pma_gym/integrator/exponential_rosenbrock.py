@@ -30,7 +30,7 @@ from math import comb, factorial
 
 from pma_gym.codegen.derivative import derivatives
 from pma_gym.codegen.graph import Value
-from pma_gym.codegen.substitute import substitute
+from pma_gym.codegen.trace import substitute
 from pma_gym.integrator.elimination import Entry, solver
 from pma_gym.integrator.equations import State
 

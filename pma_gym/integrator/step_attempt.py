@@ -6,8 +6,7 @@ from typing import Any
 
 from pma_gym.codegen.generic import from_bits, to_bits, where
 from pma_gym.codegen.graph import CHANGING, FIXED, Value
-from pma_gym.codegen.substitute import substitute
-from pma_gym.codegen.trace import order
+from pma_gym.codegen.trace import order, substitute
 from pma_gym.integrator.cascaded_states import cascaded_states, cascaded_step
 from pma_gym.integrator.equations import Equations
 from pma_gym.integrator.events import locate_event, predict_event, turns

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from pma_gym.codegen.graph import Value
-from pma_gym.codegen.substitute import substitute
+from pma_gym.codegen.trace import substitute
 from pma_gym.integrator.equations import COMMANDS, Equations
 from pma_gym.integrator.integration import Layout
 from pma_gym.integrator.step_attempt import StepAttempt

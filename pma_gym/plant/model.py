@@ -26,9 +26,8 @@ from pma_gym.effects.user_effects import (
 )
 from pma_gym.limits import LimitError
 from pma_gym.paths import is_path, missing_file
-from pma_gym.plant.parameter_rows import Note, ParameterRow
+from pma_gym.plant.parameter_rows import LINE_FORM, Note, ParameterRow, toml_text
 from pma_gym.plant.rigs import RIGS, Rig
-from pma_gym.plant.toml import LINE_FORM, toml_text
 
 SCHEMA = 1
 _shown = reprlib.repr
@@ -193,7 +192,7 @@ class Model:
     def _repr_html_(self) -> str:
         """Table of effects and parameters for notebooks."""
         from pma_gym.pages.document import TextTable
-        from pma_gym.pages.notebook import notebook_html
+        from pma_gym.pages.figures import notebook_html
 
         header = ["Effect", "Parameter", "Value", "95 % interval", "Unit", "Source"]
         rows = [

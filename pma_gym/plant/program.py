@@ -26,8 +26,7 @@ from pma_gym.codegen.machine.control import (
 )
 from pma_gym.codegen.machine.native import compiled, simd_lanes
 from pma_gym.codegen.machine.simd import SimdEmitter
-from pma_gym.codegen.substitute import substitute
-from pma_gym.codegen.trace import live_inputs
+from pma_gym.codegen.trace import live_inputs, substitute
 from pma_gym.effects.user_effects import source_of
 from pma_gym.integrator.equations import COMMANDS, ZERO
 from pma_gym.integrator.integration import memory

@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from pma_gym.codegen.rebinding import as_numpy
+from pma_gym.codegen.trace import as_numpy
 from pma_gym.effects.effect import signals
 from pma_gym.plant.model import Model
 

@@ -1,7 +1,7 @@
 """A model's equations with the arithmetic of one step, and its muscle's static force."""
 
 from pma_gym.codegen.graph import Value
-from pma_gym.codegen.substitute import substitute
+from pma_gym.codegen.trace import substitute
 from pma_gym.integrator.equations import Interpolation
 from pma_gym.integrator.integration import Layout
 from pma_gym.integrator.step_attempt import step_attempt

@@ -12,14 +12,14 @@ __all__ = ["VERDICTS", "Comparison", "Verdict", "compare_all"]
 def compare_all() -> list[Comparison]:
     """Every figure of the dissertation that its own data can check, study by study."""
     # Here: controllers import a study, and need neither python-control nor scipy.stats for it.
+    from pma_gym.studies.comparison import compare_conversions
     from pma_gym.studies.contraction import (
         compare_contraction,
         compare_profiles,
         compare_relaxation,
     )
-    from pma_gym.studies.conversions import compare_conversions
+    from pma_gym.studies.line_analysis import compare_static_loading
     from pma_gym.studies.recursion import compare_recursion
-    from pma_gym.studies.static_loading import compare_static_loading
     from pma_gym.studies.station_limits import compare_station_limits
     from pma_gym.studies.trials import compare_trials
 

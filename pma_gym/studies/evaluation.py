@@ -20,7 +20,7 @@ from pma_gym.metrics import (
     rmse,
 )
 from pma_gym.pages.document import Paragraph, TextTable
-from pma_gym.pages.notebook import notebook_html
+from pma_gym.pages.figures import notebook_html
 from pma_gym.units import SI_FACTORS
 
 LONGEST_GAP = 0.2

@@ -11,7 +11,7 @@ import warnings
 
 import pytest
 
-from pma_gym.codegen.cache import compile_cache, signing
+from pma_gym.codegen.cache import compile_cache, trust
 from pma_gym.codegen.machine import native
 from pma_gym.codegen.machine.native import Library, object_code
 
@@ -68,7 +68,7 @@ def unsigned(name, code):
 
 
 def of_another_key(name, code):
-    return compile_cache._MAGIC + signing.signature(b"k" * 32, name, code) + code
+    return compile_cache._MAGIC + trust.signature(b"k" * 32, name, code) + code
 
 
 def hash_for_signature(name, code):
@@ -76,12 +76,12 @@ def hash_for_signature(name, code):
 
 
 def of_another_name(name, code):
-    key = signing.user_key(compile_cache._store().folder)
-    return compile_cache._MAGIC + signing.signature(key, "0" * 64, code) + code
+    key = trust.user_key(compile_cache._store().folder)
+    return compile_cache._MAGIC + trust.signature(key, "0" * 64, code) + code
 
 
 def without_a_name(name, code):
-    key = signing.user_key(compile_cache._store().folder)
+    key = trust.user_key(compile_cache._store().folder)
     return compile_cache._MAGIC + hmac.digest(key, code, "sha256") + code
 
 
@@ -98,8 +98,8 @@ def test_a_planted_entry_is_not_run(entry, form):
 
 def test_the_planted_code_would_run_with_the_key_of_this_user(entry):
     """The tests above can fail: only the signature is what they lack."""
-    key, code = signing.user_key(entry.parent), planted_code()
-    entry.write_bytes(compile_cache._MAGIC + signing.signature(key, entry.stem, code) + code)
+    key, code = trust.user_key(entry.parent), planted_code()
+    entry.write_bytes(compile_cache._MAGIC + trust.signature(key, entry.stem, code) + code)
     assert value(True) == 666.0
 
 
@@ -186,7 +186,7 @@ def test_an_entry_that_is_no_file_is_not_run(entry, tmp_path, kind):
 @posix
 @pytest.mark.parametrize("fault", ["readable", "link", "short", "empty"])
 def test_a_key_that_is_not_secret_is_made_anew(entry, tmp_path, fault):
-    key = entry.parent / signing.KEY_FILE
+    key = entry.parent / trust.KEY_FILE
     old = key.read_bytes()
     if fault == "readable":
         key.chmod(0o644)
@@ -206,7 +206,7 @@ def test_a_key_that_is_not_secret_is_made_anew(entry, tmp_path, fault):
 
 @as_root
 def test_a_key_of_another_user_is_made_anew(entry):
-    key = entry.parent / signing.KEY_FILE
+    key = entry.parent / trust.KEY_FILE
     old = key.read_bytes()
     os.chown(key, OTHER_USER, OTHER_USER)
     reopen()
@@ -253,7 +253,7 @@ def test_a_cache_that_was_emptied_meanwhile_is_made_again(entry):
 def test_processes_that_make_the_key_at_once_end_with_one(tmp_path):
     code = (
         "import sys, pathlib\n"
-        "from pma_gym.codegen.cache.signing import user_key\n"
+        "from pma_gym.codegen.cache.trust import user_key\n"
         "print('ready', flush=True)\n"
         "for folder in sys.stdin:\n"
         "    print(user_key(pathlib.Path(folder.strip())).hex(), flush=True)"
@@ -273,8 +273,8 @@ def test_processes_that_make_the_key_at_once_end_with_one(tmp_path):
             process.stdin.write(f"{folder}\n")
             process.stdin.flush()
         keys = {process.stdout.readline().strip() for process in made}
-        assert keys == {(folder / signing.KEY_FILE).read_bytes().hex()}
-        assert [path.name for path in folder.iterdir()] == [signing.KEY_FILE]
+        assert keys == {(folder / trust.KEY_FILE).read_bytes().hex()}
+        assert [path.name for path in folder.iterdir()] == [trust.KEY_FILE]
     for process in made:
         process.communicate()
 
@@ -284,8 +284,8 @@ def test_without_hard_links_the_key_is_made_too(tmp_path, monkeypatch):
         raise PermissionError(1, "Operation not permitted")
 
     monkeypatch.setattr(os, "link", refuse)
-    assert signing.user_key(tmp_path) == signing.user_key(tmp_path)
-    assert [path.name for path in tmp_path.iterdir()] == [signing.KEY_FILE]
+    assert trust.user_key(tmp_path) == trust.user_key(tmp_path)
+    assert [path.name for path in tmp_path.iterdir()] == [trust.KEY_FILE]
 
 
 def test_a_system_without_owners_works(root, monkeypatch):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from controllers import CONTROLLERS, PID, FeedforwardPID
-from controllers.design.gains import Gains, scheduled_gains
+from controllers.design.designs import Gains, scheduled_gains
 from controllers.models.voltage import nominal_offset
 from pma_gym.envs import PMAEnv
 from pma_gym.plant.model import load_model

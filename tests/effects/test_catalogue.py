@@ -9,9 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pma_gym.codegen.graph import CHANGING, Graph
-from pma_gym.codegen.rebinding import as_numpy
 from pma_gym.codegen.text import evaluate
-from pma_gym.codegen.trace import trace
+from pma_gym.codegen.trace import as_numpy, trace
 from pma_gym.effects import CATALOGUE
 from pma_gym.effects.arithmetic import exponential
 from pma_gym.effects.effect import signals

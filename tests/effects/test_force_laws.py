@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from pma_gym.codegen.rebinding import as_numpy
+from pma_gym.codegen.trace import as_numpy
 from pma_gym.data.serres2008 import load_table
 from pma_gym.effects.muscle.colbrunn import COLBRUNN_SPRING
 from pma_gym.effects.muscle.geometric_force import (

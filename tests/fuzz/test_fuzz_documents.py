@@ -17,7 +17,7 @@ from benchmarks.runner.journal import case_rows
 from benchmarks.suites.frozen import parse_suite
 from benchmarks.training.configuration.preset import PresetError, load_preset
 from controllers.policies.document import PolicyError, parsed_document
-from controllers.policies.tensor_header import check_header
+from controllers.policies.tensors import check_header
 from pma_gym.data.datasets.dataset_toml import read_description
 from pma_gym.data.trial_columns import TrialError
 from pma_gym.documents import parse_json, parse_toml, parse_yaml

@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from pma_gym.codegen.graph import CHANGING
-from pma_gym.codegen.substitute import substitute
 from pma_gym.codegen.text import python_text
-from pma_gym.codegen.trace import live_inputs
+from pma_gym.codegen.trace import live_inputs, substitute
 from pma_gym.integrator.equations import COMMANDS, ZERO
 from pma_gym.integrator.exponential_rosenbrock import Step, step
 from pma_gym.integrator.step_attempt import step_start

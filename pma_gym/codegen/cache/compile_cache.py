@@ -15,8 +15,15 @@ from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 
-from pma_gym.codegen.cache.signing import SIGNATURE_BYTES, is_signed, signature, user_key
-from pma_gym.codegen.cache.trust import UntrustedError, private_folder, read_trusted
+from pma_gym.codegen.cache.trust import (
+    SIGNATURE_BYTES,
+    UntrustedError,
+    is_signed,
+    private_folder,
+    read_trusted,
+    signature,
+    user_key,
+)
 from pma_gym.files import replace_file
 from pma_gym.home import home_folder, temporary_folder
 

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from pma_gym.discovery.result.estimates import Estimate, NamedEffect
 from pma_gym.discovery.result.misfit import Gap
 from pma_gym.pages.document import Block, Callout, TextTable
-from pma_gym.pages.notebook import notebook_html
+from pma_gym.pages.figures import notebook_html
 
 _TONES = {"agrees": "good", "effect": "good", "parameters": "good", "unknown": "bad"}
 _GAP_HEADER = ["Column", "Model as given", "Parameters refitted", "Model proposed", "Noise"]

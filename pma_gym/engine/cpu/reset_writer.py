@@ -16,7 +16,7 @@ from pma_gym.codegen.machine.control import (
 )
 from pma_gym.codegen.machine.simd import SimdEmitter
 from pma_gym.codegen.random import philox, uniform
-from pma_gym.codegen.substitute import substitute
+from pma_gym.codegen.trace import substitute
 from pma_gym.engine.cpu.block_memory import BlockMemory, KernelSpec, narrowed, widened
 from pma_gym.engine.state_layout import DRAW, TARE
 from pma_gym.integrator.integration import FUSED, memory

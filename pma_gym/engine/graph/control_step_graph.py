@@ -9,7 +9,7 @@ from functools import cached_property
 from pma_gym.codegen.generic import to_real, where
 from pma_gym.codegen.graph import Value
 from pma_gym.codegen.random import normals, philox
-from pma_gym.codegen.substitute import substitute
+from pma_gym.codegen.trace import substitute
 from pma_gym.engine.actions import HIGHEST_VOLTAGE
 from pma_gym.engine.graph.exercise_step import ExerciseStep, held_volts
 from pma_gym.engine.graph.scoring import position_of

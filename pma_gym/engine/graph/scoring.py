@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from pma_gym.codegen.derivative import derivatives
 from pma_gym.codegen.graph import CHANGING, HELD, Value
-from pma_gym.codegen.substitute import substitute
+from pma_gym.codegen.trace import substitute
 from pma_gym.engine.observation import Prescribed
 from pma_gym.engine.state_layout import START, profile_at_offsets
 from pma_gym.integrator.equations import Equations

@@ -8,7 +8,7 @@ from typer.testing import CliRunner
 
 from benchmarks.__main__ import app
 from benchmarks.executors.choice import local
-from benchmarks.reproduction import job
+from benchmarks.reproduction import reproduce
 from benchmarks.runner import run
 from benchmarks.suites.frozen import load_suite
 
@@ -18,8 +18,8 @@ COMMANDS = ["profiles", "studies", "identify", "tune"]
 @pytest.fixture
 def nothing_runs(monkeypatch):
     """Every command's work is a failure of the test."""
-    from benchmarks.dissertation import profiles, studies
-    from benchmarks.identification import job as identification_job
+    from benchmarks import dissertation
+    from benchmarks.identification import identify as identification_job
     from benchmarks.tuning import tune
 
     def runs(*_, **__):
@@ -27,8 +27,8 @@ def nothing_runs(monkeypatch):
 
     modules = {
         "identify": identification_job,
-        "profiles": profiles,
-        "studies": studies,
+        "profiles": dissertation,
+        "studies": dissertation,
         "tune": tune,
     }
     for name, module in modules.items():
@@ -65,7 +65,7 @@ def test_ctrl_c_leaves_what_is_done_and_says_how_it_goes_on(tmp_path, monkeypatc
     monkeypatch.setattr(run, "execute", lambda *_: False)
     with (tmp_path / "terminal.txt").open("w") as terminal:
         console = Console(file=terminal, width=200)
-        assert job.run_job(load_suite(), tmp_path / "out", local(2), console) == 130
+        assert reproduce.run_job(load_suite(), tmp_path / "out", local(2), console) == 130
     words = (tmp_path / "terminal.txt").read_text()
     assert "Interrupted: 0 of 153 cases are done and stay in" in words
     assert "The same command goes on from there." in words
@@ -76,7 +76,7 @@ def test_ctrl_c_before_the_cases_begin_says_the_same(monkeypatch, tmp_path):
     def interrupted(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(job, "run_job", interrupted)
+    monkeypatch.setattr(reproduce, "run_job", interrupted)
     done = CliRunner().invoke(app, ["--out", str(tmp_path)])
     assert done.exit_code == 130
     assert done.stderr == "Interrupted before the first case; run it again\n"

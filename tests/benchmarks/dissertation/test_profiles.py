@@ -2,7 +2,7 @@ from importlib import resources
 
 import pytest
 
-from benchmarks.dissertation.profiles import run_profiles, write_csv
+from benchmarks.dissertation import run_profiles, write_csv
 
 SHIPPED = resources.files("pma_gym.data.serres2008") / "tables_I4_I20_voltage_profiles.csv"
 

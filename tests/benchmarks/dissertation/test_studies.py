@@ -4,7 +4,7 @@ import io
 import pytest
 from rich.console import Console
 
-from benchmarks.dissertation.studies import COLUMNS, run_studies
+from benchmarks.dissertation import COLUMNS, run_studies
 from pma_gym.studies import VERDICTS
 
 

@@ -9,7 +9,7 @@ import pytest
 from typer.testing import CliRunner
 
 from benchmarks.__main__ import app
-from benchmarks.dissertation.voltages import FEEDFORWARDS
+from benchmarks.dissertation import FEEDFORWARDS
 from benchmarks.runner.rollout import make_environment, rollout
 from controllers import CONTROLLERS
 from pma_gym.cli import app as pma_gym

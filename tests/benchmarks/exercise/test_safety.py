@@ -10,9 +10,16 @@ from typer.testing import CliRunner
 from benchmarks.__main__ import app
 from benchmarks.executors.choice import local
 from benchmarks.executors.executor import ThisProcess
-from benchmarks.exercise.safety_layer.adversarial import KINDS, PUMPING, kind_of, planned, pumped
-from benchmarks.exercise.safety_layer.episodes import SETS, measure
-from benchmarks.exercise.safety_layer.job import read_safety, run_safety, safety_text
+from benchmarks.exercise.safety_episodes import (
+    KINDS,
+    PUMPING,
+    SETS,
+    kind_of,
+    measure,
+    planned,
+    pumped,
+)
+from benchmarks.exercise.safety_layer import read_safety, run_safety, safety_text
 from pma_gym.tasks import EXERCISES, PACED, PACING
 from pma_gym.tasks.exercise import SAFE_MOMENT
 from pma_gym.tasks.safety_filter import FILTER_PACED, FILTER_PACING, filtered_pressure

@@ -9,11 +9,10 @@ from rich.console import Console
 from typer.testing import CliRunner
 
 from benchmarks.__main__ import app
-from benchmarks.measured import job
+from benchmarks.measured import diagnose_tables
 from benchmarks.measured import rounds as of_rounds
 from benchmarks.measured.detectability import Proposal, Undecidable
-from benchmarks.measured.held_out import limit_errors, repeat_scatter, rms, worked
-from benchmarks.measured.job import (
+from benchmarks.measured.diagnose_tables import (
     DIAGNOSED_KPA,
     UNSEEN_KPA,
     Measured,
@@ -21,10 +20,9 @@ from benchmarks.measured.job import (
     judged_at,
     write_trials,
 )
+from benchmarks.measured.held_out import limit_errors, repeat_scatter, rms, smooth_errors, worked
 from benchmarks.measured.pages import measured_page
-from benchmarks.measured.rounds import Round, rounds
-from benchmarks.measured.smooth import smooth_errors
-from benchmarks.measured.stages import Stages
+from benchmarks.measured.rounds import Round, Stages, rounds
 from benchmarks.measured.steps import Step
 from benchmarks.measured.tables import COLUMNS, print_measured
 from benchmarks.measured.trials import measured_dataset
@@ -214,7 +212,9 @@ def test_fits_of_other_code_do_not_go_into_a_diagnosis(tmp_path):
 
 def test_the_command_says_what_is_to_be_made_anew(tmp_path, monkeypatch):
     orders = []
-    monkeypatch.setattr(job, "run_measured", lambda *_, recompute: orders.append(recompute))
+    monkeypatch.setattr(
+        diagnose_tables, "run_measured", lambda *_, recompute: orders.append(recompute)
+    )
     for options in ([], ["--recompute"]):
         done = CliRunner().invoke(app, ["measured", "--out", str(tmp_path), *options])
         assert done.exit_code == 0, done.output

@@ -7,10 +7,9 @@ from rich.console import Console
 from typer.testing import CliRunner
 
 from benchmarks.__main__ import app
-from benchmarks.remake.chain import MODEL, Step, chain, content
-from benchmarks.remake.figures import compared, figures
-from benchmarks.remake.job import TABLE, Remake
-from benchmarks.remake.versions import model_digest, raise_versions
+from benchmarks.remake import TABLE, Remake, compared, figures
+from benchmarks.remake_steps import MODEL, Step, chain, content
+from benchmarks.suites.versions import model_digest, raise_versions
 
 
 class Machine:
@@ -98,7 +97,7 @@ def test_the_suites_go_with_the_shipped_station():
     """Who changes the station runs `python -m benchmarks remake --only suites`."""
     kept = chain()[1].commands[0][1].rpartition(".")[0]
     assert kept == "benchmarks.remake"
-    from benchmarks.remake.versions import KEPT, SUITES
+    from benchmarks.suites.versions import KEPT, SUITES
 
     assert (SUITES / KEPT).read_text(encoding="utf-8").strip() == model_digest()
 

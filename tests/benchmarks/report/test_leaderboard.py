@@ -20,8 +20,7 @@ from benchmarks.report.publish import NUMBERS, PAGE, PAIRS, TEXT, numbers_csv, p
 from benchmarks.report.tracking_cost import spending
 from benchmarks.runner.journal import JOURNAL, Journal
 from benchmarks.runner.provenance import RUN
-from benchmarks.suites.suite import Episode, SuiteError
-from benchmarks.suites.target import parse_target
+from benchmarks.suites.suite import Episode, SuiteError, parse_target
 from controllers import CONTROLLERS
 from pma_gym.pages.document import to_markdown
 from pma_gym.pages.figures import picture_files

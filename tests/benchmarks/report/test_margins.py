@@ -17,8 +17,8 @@ from benchmarks.report.margins import (
     reference_step,
     worst,
 )
-from benchmarks.tuning.plant import linearised, sampled
-from controllers.design.gains import Gains
+from benchmarks.tuning.loop_margins import linearised, sampled
+from controllers.design.designs import Gains
 from controllers.feedforward_pid import FeedforwardPID
 from controllers.improved_feedforward import ImprovedFeedforward
 from controllers.pid import PID, linear_law

@@ -10,9 +10,9 @@ from typer.testing import CliRunner
 
 from benchmarks.__main__ import app
 from benchmarks.executors.executor import ThisProcess
-from benchmarks.reproduction.job import report_again, run_job, targets_again
 from benchmarks.reproduction.replay import ReplayError
 from benchmarks.reproduction.replay_page import displacement_verdict
+from benchmarks.reproduction.reproduce import report_again, run_job, targets_again
 from benchmarks.reproduction.results import CSV_COLUMNS, FIGURES, Results
 from benchmarks.reproduction.tables import columns
 from benchmarks.runner.controller_spec import ControllerSpec, parse_controllers

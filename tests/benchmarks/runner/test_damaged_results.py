@@ -6,12 +6,12 @@ import pytest
 
 from benchmarks.hidden_effects.generation.blocks import Block
 from benchmarks.hidden_effects.job import JobError, Order, run_block
-from benchmarks.measured.stages import Stages
+from benchmarks.measured.rounds import Stages
 from benchmarks.runner.journal import JOURNAL, case_rows
 from benchmarks.runner.provenance import RUN, check_run, finished_rows, read_run
 from benchmarks.suites.suite import SuiteError
-from benchmarks.tuning.finished_rows import KeptRows
-from controllers.design.gains import Gains
+from benchmarks.tuning.tuning_task import KeptRows
+from controllers.design.designs import Gains
 from tests.benchmarks.hidden_effects.cheap_diagnosis import by_size
 from tests.fuzz.test_fuzz_documents import ROW
 

@@ -9,9 +9,8 @@ import pytest
 
 from benchmarks.runner.case import Case, cases, run_case
 from benchmarks.runner.controller_spec import ControllerSpec
-from benchmarks.suites.feasibility import inability
 from benchmarks.suites.frozen import frozen_suite, suite_names
-from benchmarks.suites.stations import draw_station
+from benchmarks.suites.stations import draw_station, inability
 from benchmarks.suites.suite import NOMINAL, Episode, EpisodePlan, SuiteError
 from controllers import CONTROLLERS
 from pma_gym.envs import PMAEnv

@@ -9,7 +9,7 @@ pytest.importorskip("safetensors")
 
 from safetensors.numpy import save
 
-from controllers.policies.tensor_header import LARGEST_HEADER, check_header
+from controllers.policies.tensors import LARGEST_HEADER, check_header
 
 SOUND = save({"a": np.zeros((3, 4), np.float32), "b": np.arange(5.0)})
 

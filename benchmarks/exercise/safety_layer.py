@@ -7,7 +7,7 @@ from rich.console import Console
 from rich.progress import Progress
 
 from benchmarks.executors.executor import Executor
-from benchmarks.exercise.safety_layer.episodes import Safety, Tally, measure
+from benchmarks.exercise.safety_episodes import Safety, Tally, measure
 from benchmarks.exercise.tables import NONE, terminal_table
 from benchmarks.files import write_text
 from pma_gym.document_shape import ListOf, Whole, check_shape, shape_of

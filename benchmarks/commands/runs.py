@@ -1,4 +1,4 @@
-"""The commands about frozen suites: `run`, `report`, `compare`, `add`, `remove`, `suites`."""
+"""The commands about suites, their runs and comparisons; `targets` is for maintainers alone."""
 
 import sys
 from pathlib import Path
@@ -16,12 +16,16 @@ from benchmarks.commands.options import (
     listed,
     refuse,
 )
+from benchmarks.executors.executor import Executor
 from pma_gym.cli.options import JsonOption
 from pma_gym.cli.terminal import print_json, print_table
 
 
 def register(app: typer.Typer) -> None:
     """Add the commands to the program."""
+    app.callback(epilog="Example: python -m benchmarks --controllers pid --pressures 300")(
+        reproduction
+    )
     app.command(
         epilog="Example: python -m benchmarks run --suite robust --controllers pid,mine.py:Mine"
     )(run)
@@ -30,6 +34,44 @@ def register(app: typer.Typer) -> None:
     app.command(epilog="Example: python -m benchmarks add mine.py:Mine --suite hard")(add)
     app.command(epilog="Example: python -m benchmarks remove Mine --suite hard")(remove)
     app.command(epilog="Example: python -m benchmarks suites")(suites)
+    app.command(hidden=True, epilog="Example: python -m benchmarks targets robust")(targets)
+
+
+def targets(
+    suite: Annotated[str, typer.Argument(help="Name, see `suites`, or path of a TOML file.")],
+    results: Annotated[
+        Path | None, typer.Option(help="Folder of the run; results/SUITE if not given.")
+    ] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Check a run against what its suite asks for; exit code 1 if a target is missed."""
+    from benchmarks.bounds import Bounds
+    from benchmarks.report.leaderboard import read_leaderboard
+    from benchmarks.report.tables import verdict_table
+    from benchmarks.reproduction.reproduce import targets_again
+    from benchmarks.reproduction.targets import target_table
+    from benchmarks.suites.frozen import frozen_suite
+    from benchmarks.suites.reproduction import ReproductionSuite
+    from benchmarks.suites.suite import SuiteError
+
+    try:
+        frozen = frozen_suite(suite)
+        folder = results or RESULTS / frozen.name
+        if isinstance(frozen, ReproductionSuite):
+            checks = targets_again(frozen, folder, chosen_executor(LOCAL, 2))
+            table = target_table(checks, frozen.models[0])
+        else:
+            with Bounds(frozen.model, folder) as bounds:
+                checks = read_leaderboard(frozen, folder, bounds).verdicts
+            table = verdict_table(checks)
+    except SuiteError as error:
+        refuse(error)
+    documents = [check.document() for check in checks]
+    if as_json:
+        print_json(documents)
+    else:
+        print_table(table)
+    raise typer.Exit(1 if any(each["verdict"] == "missed" for each in documents) else 0)
 
 
 def run(
@@ -52,7 +94,7 @@ def run(
 ) -> None:
     """Compare controllers on a frozen suite; an interrupted run goes on where it stopped."""
     from benchmarks.comparison.job import chosen, run_comparison
-    from benchmarks.reproduction.job import run_job
+    from benchmarks.reproduction.reproduce import run_job
     from benchmarks.runner.controller_spec import ControllerError
     from benchmarks.suites.frozen import frozen_suite
     from benchmarks.suites.reproduction import ReproductionSuite
@@ -103,7 +145,7 @@ def report(
     from benchmarks.comparison.command_lines import run_command
     from benchmarks.executors.choice import local
     from benchmarks.report.publish import run_report
-    from benchmarks.reproduction.job import report_again
+    from benchmarks.reproduction.reproduce import report_again
     from benchmarks.suites.frozen import frozen_suite
     from benchmarks.suites.reproduction import ReproductionSuite
     from benchmarks.suites.suite import SuiteError
@@ -204,3 +246,64 @@ def suites(as_json: JsonOption = False) -> None:
         print_json(suite_documents())
     else:
         print_suites(SafeConsole())
+
+
+def reproduction(
+    context: typer.Context,
+    out: Annotated[Path, typer.Option(help="Folder.")] = RESULTS / "reproduction",
+    controllers: Annotated[
+        str, typer.Option(help="Names or file.py:Class by commas; else all.")
+    ] = "",
+    model: Annotated[
+        str,
+        typer.Option(help="Names or TOML files by commas; else the suite's."),
+    ] = "",
+    task: Annotated[str, typer.Option(help="displacement or rotation; else both.")] = "",
+    pressures: Annotated[str, typer.Option(help="In kPa by commas; else all.")] = "",
+    jobs: Jobs = 2,
+    executor: ExecutorOption = LOCAL,
+) -> None:
+    """Run every controller through every trial and write the report."""
+    if context.invoked_subcommand is not None:
+        return
+    try:
+        code = reproduce(out, controllers, model, task, pressures, chosen_executor(executor, jobs))
+    except KeyboardInterrupt:
+        print("Interrupted before the first case; run it again", file=sys.stderr)
+        code = INTERRUPTED
+    raise typer.Exit(code)
+
+
+def reproduce(
+    out: Path, controllers: str, model: str, task: str, pressures: str, executor: Executor
+) -> int:
+    """The main job; its exit code."""
+    from benchmarks.reproduction.reproduce import run_job
+    from benchmarks.runner.controller_spec import ControllerError, parse_controllers
+    from benchmarks.suites.frozen import load_suite
+    from benchmarks.suites.suite import SuiteError
+    from pma_gym.plant.model import ModelError, load_model
+    from pma_gym.terminal import SafeConsole
+
+    suite = load_suite()
+    try:
+        models = listed(model)
+        for name in models or suite.models:
+            load_model(name)
+        chosen = parse_controllers(controllers, suite.controllers) if controllers else []
+        suite = suite.select(models, chosen, listed(task), _pressures(pressures))
+        if out.exists() and not out.is_dir():
+            raise SuiteError(f"--out {out} is a file; name a folder for the results")
+    except (ControllerError, ModelError, SuiteError) as error:
+        refuse(error)
+    return run_job(suite, out, executor, SafeConsole())
+
+
+def _pressures(text: str) -> list[float]:
+    from benchmarks.suites.suite import SuiteError
+    from pma_gym.numerals import parse_numbers
+
+    numbers = parse_numbers(text)
+    if numbers is None:
+        raise SuiteError(f"--pressures must be numbers in kPa by commas, got {text!r}")
+    return numbers

@@ -15,13 +15,11 @@ from rich.progress import Progress as Bar
 
 from benchmarks.files import write_text
 from benchmarks.measured.detectability import undecidable
+from benchmarks.measured.held_out import smooth_errors
 from benchmarks.measured.pages import measured_page
-from benchmarks.measured.result import Measured
-from benchmarks.measured.rounds import MOST_ROUNDS, rounds
-from benchmarks.measured.smooth import smooth_errors
-from benchmarks.measured.stages import Stages
+from benchmarks.measured.rounds import MOST_ROUNDS, Stages, rounds
 from benchmarks.measured.steps import folds, steps
-from benchmarks.measured.tables import print_measured
+from benchmarks.measured.tables import Measured, print_measured
 from benchmarks.measured.trials import measured_dataset
 from benchmarks.measured.triangles import held_against
 from pma_gym.data.datasets.dataset import Dataset

@@ -14,7 +14,7 @@ from rich.table import Table
 from benchmarks.executors.choice import local
 from benchmarks.executors.executor import run_or_raise
 from benchmarks.files import write_text
-from benchmarks.identification import judge, statics
+from benchmarks.identification import statics, station
 from benchmarks.identification.creep import STUDENT_10, CreepFold, decided, load_cycle_with_creep
 from benchmarks.identification.measurements import StationLimits, station_limits
 from benchmarks.identification.station import fitted_parameters, identify, leave_out
@@ -53,8 +53,8 @@ def run_identify(out: Path, jobs: int = 2, console: Console | None = None) -> Mo
     chosen = [fold.creeping if decision.asked else fold.plain for fold in folds]
     model = _noted(whole, [fitted_parameters(fold) for fold, _ in chosen])
     judged = [errors for _, errors in chosen]
-    words = [decision.words, *judge.unexplained(whole, data, steps)]
-    write_text(out, _header(judge.figures(judged), words) + dump_model(model))
+    words = [decision.words, *station.unexplained(whole, data, steps)]
+    write_text(out, _header(station.figures(judged), words) + dump_model(model))
     _print(console, model, judged, words)
     console.print(f"written: {out}")
     return model
@@ -69,8 +69,8 @@ class Fold(NamedTuple):
         creep: what says whether creep is asked for.
     """
 
-    plain: tuple[Model, judge.LeftOut]
-    creeping: tuple[Model, judge.LeftOut]
+    plain: tuple[Model, station.LeftOut]
+    creeping: tuple[Model, station.LeftOut]
     creep: CreepFold
 
 
@@ -100,8 +100,8 @@ def _fold(
         float(np.mean(statics.weighted(creeping, here, none, load_cycle_with_creep) ** 2)),
     ]
     return Fold(
-        (plain, judge.left_out(plain, here)),
-        (creeping, judge.left_out(creeping, here, load_cycle_with_creep)),
+        (plain, station.left_out(plain, here)),
+        (creeping, station.left_out(creeping, here, load_cycle_with_creep)),
         CreepFold(fitted_parameters(creeping)["creep.stiffness_n_per_mm"], *missed),
     )
 
@@ -178,7 +178,7 @@ def _header(figures: dict[str, float], words: list[str]) -> str:
     return "".join(f"# {line}\n" for line in lines)
 
 
-def _print(console: Console, model: Model, folds: list[judge.LeftOut], words: list[str]) -> None:
+def _print(console: Console, model: Model, folds: list[station.LeftOut], words: list[str]) -> None:
     table = Table("parameter", "value", "low", "high", title="Identified station")
     for path, note in model.notes.items():
         if note.low is not None:
@@ -198,13 +198,13 @@ def _print(console: Console, model: Model, folds: list[judge.LeftOut], words: li
     for fold in folds:
         table.add_row(
             f"{fold.pressure / 1e3:.0f}",
-            f"{judge.rms(fold.extension):.2f}",
-            f"{judge.rms(fold.rotation):.2f}",
+            f"{station.rms(fold.extension):.2f}",
+            f"{station.rms(fold.rotation):.2f}",
             f"{fold.no_load:+.2f}",
         )
     console.print(table)
-    for name, figure in judge.figures(folds).items():
-        target = judge.TARGETS[name]
+    for name, figure in station.figures(folds).items():
+        target = station.TARGETS[name]
         verdict = "met" if figure <= target else "MISSED"
         console.print(f"{name}: {figure:.2f}, target {target:g}: {verdict}")
     console.print("Not explained:")

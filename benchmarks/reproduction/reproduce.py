@@ -1,24 +1,143 @@
 """The main job: run the reproduction, write its results, say how it went."""
 
+import shutil
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from rich.console import Console
+from rich.table import Table
 
 from benchmarks.bounds import Bounds
-from benchmarks.executors.executor import Executor
-from benchmarks.reproduction.pictured import pictured_trials
-from benchmarks.reproduction.report import write_report
-from benchmarks.reproduction.results import Results, Score, scores_of
-from benchmarks.reproduction.summary import print_summary
+from benchmarks.executors.executor import Executor, run_all
+from benchmarks.files import write_bytes, write_text
+from benchmarks.reproduction.page import report_blocks, report_pictures
+from benchmarks.reproduction.replay import all_replay_errors
+from benchmarks.reproduction.results import Results, Score, csv_text, json_text, scores_of
+from benchmarks.reproduction.rotation_reading import entries
+from benchmarks.reproduction.tables import summary_table
 from benchmarks.reproduction.targets import Check, check_targets
-from benchmarks.runner.execution import pending_cases
+from benchmarks.runner.case import Case, drive
+from benchmarks.runner.execution import PendingCases, identity, pending_cases
 from benchmarks.runner.provenance import check_run, read_run
 from benchmarks.runner.run import FAILED, INTERRUPTED, SuiteRun, run_missing, say_interrupted
 from benchmarks.suites.reproduction import ReproductionSuite
 from benchmarks.suites.suite import SuiteError
+from pma_gym.data.trial import Trial
+from pma_gym.pages.document import TextTable, to_html, to_markdown
+from pma_gym.pages.figures import picture_files, pngs
+
+
+def print_summary(results: Results, report: Path, console: Console) -> None:
+    """Tables 22 and 30 condensed, the speed, and where the report is."""
+    console.print(_shown(summary_table(results)))
+    print_failures(results, console)
+    info = results.info
+    console.print(
+        f"{info['environment_steps']} environment steps in {info['wall_time_s']:.0f} s with "
+        f"{info['jobs']} processes; in one: {info['environment_steps_per_second']:.0f} a second, "
+        f"{info['case_steps_per_second']:.0f} with controllers and scoring",
+        highlight=False,
+    )
+    console.print(f"Report: {report}", highlight=False, soft_wrap=True)
+
+
+def print_failures(results: Results, console: Console) -> None:
+    """Print why cases failed: each reason once, with the count and the first cases."""
+    if not results.failures:
+        return
+    console.print(
+        f"{len(results.failures)} cases failed, all others are scored:",
+        highlight=False,
+    )
+    for names, reason in results.failure_reasons():
+        console.print(f"  {names}: {reason}", markup=False, highlight=False)
+
+
+def _shown(text: TextTable) -> Table:
+    table = Table(text.header[0], title=text.title, title_justify="left")
+    for name in text.header[1:]:
+        table.add_column(name.replace(" (", "\n("), justify="right")
+    for row in text.rows:
+        table.add_row(*row)
+    return table
+
+
+PLOTS = "plots"
+
+
+def write_report(results: Results, out: Path, vector: bool = False) -> None:
+    """Write everything; all is computed before anything is replaced, so no folder mixes two runs.
+
+    Args:
+        results: the run.
+        out: folder; made if need be.
+        vector: whether every picture is written as SVG and PDF too.
+    """
+    files = picture_files(report_pictures(results), vector)
+    pictures = pngs(files)
+    checks = check_targets(results)
+    blocks = report_blocks(results)
+    errors = all_replay_errors(results, results.suite.models[0])
+    texts = {
+        "report.md": to_markdown(blocks, pictures, PLOTS),
+        "report.html": to_html(blocks, pictures),
+        "scores.csv": csv_text(results.scores),
+        "scores.json": json_text(
+            results,
+            targets=[asdict(check) | {"verdict": check.verdict} for check in checks],
+            replay_errors=[asdict(error) for trials in errors.values() for error in trials],
+            rotation_reading=entries(results.suite.models[0]) if errors else [],
+        ),
+    }
+    shutil.rmtree(out / PLOTS, ignore_errors=True)
+    for name, content in files.items():
+        write_bytes(out / PLOTS / name, content)
+    for name, text in texts.items():
+        write_text(out / name, text)
+
+
+Pictured = dict[tuple[str, str, float], Trial]
+"""Trials by controller, task and pressure (kPa)."""
+
+
+def pictured_trials(
+    suite: ReproductionSuite, todo: PendingCases, failed: set[str], executor: Executor
+) -> Pictured:
+    """The trials of a run that its report draws: the same bits as those that were scored.
+
+    Args:
+        suite: what was run.
+        todo: its cases.
+        failed: names of cases that have no trial.
+        executor: where they are driven.
+    Returns:
+        The trials; one that cannot be driven again is left out.
+    Raises:
+        KeyboardInterrupt: Ctrl-C.
+    """
+    drawn = [c for c in todo.cases if suite.is_pictured(c.episode) and c.name not in failed]
+    trials: dict[int, Trial] = {}
+
+    def keep(index: int, result: object) -> None:
+        if isinstance(result, Trial):
+            trials[index] = result
+
+    if not run_all([partial(_driven, case) for case in drawn], executor, keep):
+        raise KeyboardInterrupt
+    return {
+        (name, episode.task, episode.pressure_kpa): trials[index]
+        for index, case in enumerate(drawn)
+        for name, episode in [identity(case)]
+        if index in trials
+    }
+
+
+def _driven(case: Case) -> Trial:
+    return drive(case)[0].trial
+
 
 _OF_THE_SUITE = ("schema", "suite", "contenders", "complete", "code")
 """Entries of `run.json` that `scores.json` says otherwise."""

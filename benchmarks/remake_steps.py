@@ -11,9 +11,9 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from benchmarks.remake.versions import model_digest
 from benchmarks.runner.fingerprint import ROOT
 from benchmarks.suites.frozen import frozen_suite, suite_names
+from benchmarks.suites.versions import model_digest
 from benchmarks.training.card import train_words
 from benchmarks.tuning.design import designable
 from controllers.policies.policy_file import load_policy_file
@@ -122,7 +122,7 @@ def _policies() -> Iterable[tuple[str, ...]]:
 TABLES = (Path("benchmarks/identification"), Path("pma_gym/data/serres2008"))
 """What the station is identified from, and by."""
 
-VERSIONS = "benchmarks.remake.versions"
+VERSIONS = "benchmarks.suites.versions"
 """Module that gives suites a new version where their stations are others."""
 
 

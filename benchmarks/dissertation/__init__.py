@@ -1,1 +1,0 @@
-"""The dissertation's figures, profiles and feed-forward voltages, recomputed."""

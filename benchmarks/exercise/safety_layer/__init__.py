@@ -1,1 +1,0 @@
-"""Rate of harm by adversarial commands, with the safety layer and without."""

@@ -1,1 +1,0 @@
-"""The second wheel: controllers and benchmark for those who have no clone."""

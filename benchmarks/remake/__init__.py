@@ -1,1 +1,0 @@
-"""Makes anew all that depends on the station's model: `python -m benchmarks remake`."""
