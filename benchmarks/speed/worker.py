@@ -236,12 +236,18 @@ def do_mpc() -> Chunk:
     made.set_param(t_step=PERIOD_S, integration_tool="cvodes", reltol=1e-6, abstol=1e-9)
     made.setup()
 
+    command, last = np.zeros((1, 1)), None
+
     def integrate(state: Any, motor: float) -> Any:  # noqa: ANN401
-        made.x0 = state
-        # What it records of every step is copied whole in every step.
-        made.reset_history()
-        made.make_step(np.array([[motor]]))
-        return np.asarray(made.x0.cat).ravel()
+        nonlocal last
+        if state is not last:
+            made.x0 = state
+            # What it records of every step is copied whole in every step.
+            made.reset_history()
+        command[0, 0] = motor
+        made.make_step(command)
+        last = np.asarray(made.x0.cat).ravel()
+        return last
 
     return _trial(integrate)
 
