@@ -117,8 +117,9 @@ def execute(
             # What other code made goes with its row.
             for form in TRACES:
                 trace_file(case, out, form).unlink(missing_ok=True)
-            if "trace" in row:
-                write_bytes(trace_file(case, out, todo.traces), row.pop("trace"))
+            trace: bytes | None = row.pop("trace", None)  # type: ignore[assignment]
+            if trace is not None:
+                write_bytes(trace_file(case, out, todo.traces), trace)
             journal.append(row)
             on_done(row)
 

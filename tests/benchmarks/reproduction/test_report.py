@@ -216,7 +216,7 @@ def test_blocks_are_escaped_and_marked_up():
     assert "<title>A &lt;b&gt;</title>" in page
     assert "<strong>bold</strong> <code>code</code> &amp; more" in page
     assert '<th class="group" colspan="2">A</th>' in page
-    assert '<tr class="ruled"><th>mean</th>' in page
+    assert '<tr class="ruled"><th data-name="p">mean</th><td data-name="A, mm">2</td>' in page
     text = to_markdown(blocks, {}, "plots")
     assert "| p | A<br>mm | A<br>% |" in text
     assert "never drawn" not in page + text
