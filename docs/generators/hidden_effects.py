@@ -7,8 +7,7 @@ from typing import Any
 from benchmarks.hidden_effects.baselines.comparison import COLUMNS
 from benchmarks.hidden_effects.baselines.registry import BASELINES
 from benchmarks.hidden_effects.bound import detected, identified
-from benchmarks.hidden_effects.evaluation.readme import diagnosis
-from benchmarks.hidden_effects.evaluation.summary import report_blocks
+from benchmarks.hidden_effects.evaluation.summary import diagnosis, report_blocks
 from generators.text import code, table
 from pma_gym.pages.document import TextTable, to_markdown
 

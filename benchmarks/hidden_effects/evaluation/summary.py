@@ -1,15 +1,42 @@
 """`python -m benchmarks hidden-effects-report`: several blocks' figures as one document."""
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from benchmarks.hidden_effects.evaluation.tables import instead, listed, percent
-from benchmarks.hidden_effects.job import SCORE, JobError, merged
+from benchmarks.hidden_effects.run_blocks import SCORE, JobError, merged
 from pma_gym.document_shape import ListOf, ShapeError, Whole, check_shape
 from pma_gym.documents import read_json
 from pma_gym.pages.document import Block, Heading, Paragraph, TextTable, to_html, to_markdown
+
+KEPT = Path(__file__).resolve().parents[3] / "docs" / "figures" / "hidden-effects.json"
+"""What runs of `hidden-effects --json` wrote of their blocks, put together."""
+
+ROWS = (
+    ("one effect, 0.5 to 2 times the noise: named", "single", "named right"),
+    ("... wrongly named", "single", "confidently wrong"),
+    ("nothing hidden: an effect claimed", "nothing", "false alarm"),
+    ("an effect outside the catalogue: `unknown`", "unknown", "unknown"),
+)
+"""What each row says, of which block and rate it is; docs/notebook/diagnosis-results.md has all."""
+
+
+def diagnosis(kept: Path = KEPT) -> str:
+    """The rates that a newcomer asks for, with 95 % interval and count, as Markdown."""
+    blocks = read_json(kept, "journal_mib", own=True, finite=False)["blocks"]
+    lines = ["| | Share (95 % interval) | Cases |", "| :-- | --: | --: |"]
+    for words, block, name in ROWS:
+        rate = blocks[block]["rates"][name]
+        lines.append(f"| {words} | {_rate(rate)} | {rate['n']} |")
+    return "\n".join(lines)
+
+
+def _rate(rate: Mapping[str, Any]) -> str:
+    share, low, high = (100.0 * rate[key] for key in ("rate", "low", "high"))
+    return f"{share:.1f} % ({low:.1f} to {high:.1f})"
+
 
 MISSES = 40
 """How many misses of a block are listed; the rest are in its JSON."""
