@@ -15,7 +15,7 @@ from typing import Annotated, Any
 import typer
 
 from benchmarks.files import write_text
-from benchmarks.hidden_effects.evaluation.readme import diagnosis
+from benchmarks.hidden_effects.evaluation.summary import diagnosis
 from benchmarks.runner.phase_score import PHASES, UNITS
 from pma_gym.documents import read_json
 

@@ -16,7 +16,7 @@ from typer.testing import CliRunner
 import benchmarks.__main__
 import pma_gym.cli
 from benchmarks import readme_table
-from benchmarks.hidden_effects.evaluation.readme import KEPT
+from benchmarks.hidden_effects.evaluation.summary import KEPT
 from benchmarks.readme_table import FIGURES, RunError, load_run, refreshed
 from benchmarks.runner.phase_score import PHASES, measured_score
 from benchmarks.suites.frozen import load_suite

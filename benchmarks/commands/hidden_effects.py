@@ -56,7 +56,7 @@ def hidden_effects(
     recompute: Recompute = False,
 ) -> None:
     """Hide effects in trials, diagnose them, count what was named right; goes on after Ctrl-C."""
-    from benchmarks.hidden_effects.job import JobError, Order, ordered, run_hidden_effects
+    from benchmarks.hidden_effects.run_blocks import JobError, Order, ordered, run_hidden_effects
 
     require_writable(json_file, "--json")
     places = chosen_executor(executor, jobs)
@@ -86,7 +86,7 @@ def hidden_effects_report(
     """Write the figures of several blocks of hidden effects as one page of tables."""
     from benchmarks.files import write_text
     from benchmarks.hidden_effects.evaluation.summary import read_scores, report
-    from benchmarks.hidden_effects.job import JobError
+    from benchmarks.hidden_effects.run_blocks import JobError
 
     try:
         text = report(read_scores(places), out.suffix if out else ".md")

@@ -8,8 +8,7 @@ from benchmarks.hidden_effects.baselines.comparison import COLUMNS
 from benchmarks.hidden_effects.baselines.registry import BASELINES
 from benchmarks.hidden_effects.bound import detected, identified
 from benchmarks.hidden_effects.evaluation.measured import measured_text
-from benchmarks.hidden_effects.evaluation.readme import diagnosis
-from benchmarks.hidden_effects.evaluation.summary import measured_in, report_blocks
+from benchmarks.hidden_effects.evaluation.summary import diagnosis, measured_in, report_blocks
 from generators.text import code, table
 from pma_gym.pages.document import TextTable, to_markdown
 

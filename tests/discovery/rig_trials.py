@@ -12,8 +12,7 @@ import numpy as np
 
 from benchmarks.hidden_effects.physics import simulation
 from benchmarks.hidden_effects.physics.drive import CommandDelay
-from benchmarks.hidden_effects.physics.friction import Bristles, MaxwellSlip
-from benchmarks.hidden_effects.physics.muscle import Dashpots
+from benchmarks.hidden_effects.physics.muscle import Bristles, Dashpots, MaxwellSlip
 from benchmarks.hidden_effects.physics.rig import DAQ_STEP, NOISE, NOMINAL, SIGNALS, UNITS, VOLTS
 from pma_gym.data.trial import Trial
 

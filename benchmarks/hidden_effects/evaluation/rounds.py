@@ -14,7 +14,7 @@ import numpy as np
 from benchmarks.hidden_effects.evaluation.diagnosis import Answer, Judge, asked
 from benchmarks.hidden_effects.evaluation.verdicts import compare, judged
 from benchmarks.hidden_effects.generation.cases import Case, measure
-from benchmarks.hidden_effects.generation.experiment_library import Volts, random_experiment
+from benchmarks.hidden_effects.generation.files import Volts, random_experiment
 from benchmarks.hidden_effects.physics.simulation import RATE
 
 CHOOSERS = ("proposed", "random")

@@ -5,10 +5,9 @@ from dataclasses import dataclass, field
 from typing import Any, get_args
 
 from benchmarks.hidden_effects.generation.effects import ALL
-from benchmarks.hidden_effects.generation.expected_parameters import expected
-from benchmarks.hidden_effects.generation.groups import group
+from benchmarks.hidden_effects.generation.groups import expected, group
 from benchmarks.hidden_effects.generation.likelihood_ratios import UNTOLD
-from benchmarks.hidden_effects.rigs import sizes
+from benchmarks.hidden_effects.rigs import effect_size
 from pma_gym.discovery.diagnosis import Verdict
 
 STRUCTURAL = ("effect", "unknown")
@@ -289,7 +288,7 @@ def _sizes(outcome: Outcome, truth: Mapping[str, Any], effects: list[Mapping[str
     for effect in truth["effects"]:
         if truth["block"] == "rigs":
             kind = truth["rig"].get("kind", "imposed")
-            values = sizes.expected(kind, effect["name"], effect["parameters"], hidden)
+            values = effect_size.expected(kind, effect["name"], effect["parameters"], hidden)
         else:
             values = expected(effect["name"], effect["parameters"])
         for name, value in values.items():

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from benchmarks.hidden_effects.physics import drive, friction, muscle, outside, sensing, valve
+from benchmarks.hidden_effects.physics import drive, muscle, outside
 from benchmarks.hidden_effects.physics.effect import Hidden
 from benchmarks.hidden_effects.physics.rig import SENSORS, Array
 
@@ -65,13 +65,13 @@ def _slow(signal: int, low: float, high: float) -> Kind:
     return Kind(
         lambda g, most: {"longer_ms": _log(g, low, high)},
         ("longer_ms",),
-        lambda p: sensing.SlowSensor(signal, p["longer_ms"] * 1e-3),
+        lambda p: outside.SlowSensor(signal, p["longer_ms"] * 1e-3),
         10.0,
     )
 
 
 def _friction(by_pressure: float) -> Callable[[Columns], Hidden]:
-    return lambda p: friction.SlideFriction(
+    return lambda p: muscle.SlideFriction(
         p["dynamic_n"],
         one(p["presliding_um"]) * 1e-6,
         one(p["breakaway"]),
@@ -121,32 +121,32 @@ KINDS: dict[str, Kind] = {
     "regulator_asymmetry": Kind(
         lambda g, most: {"excess": _sign(g) * _log(g, 0.2, 0.5)},
         ("excess",),
-        lambda p: valve.SlowVent(np.exp(p["excess"])),
+        lambda p: drive.SlowVent(np.exp(p["excess"])),
         4.0,
     ),
     "regulator_rate_limit": Kind(
         lambda g, most: {"limit_kpa_per_s": _log(g, 600.0, 3000.0)},
         (),
-        lambda p: valve.NarrowValve(p["limit_kpa_per_s"] * 1e3),
+        lambda p: drive.NarrowValve(p["limit_kpa_per_s"] * 1e3),
         20.0,
         ("limit_kpa_per_s",),
     ),
     "regulator_delay": Kind(
         lambda g, most: {"delay_ms": _log(g, 10.0, 30.0)},
         ("delay_ms",),
-        lambda p: valve.LateValve(p["delay_ms"] * 1e-3),
+        lambda p: drive.LateValve(p["delay_ms"] * 1e-3),
         4.0,
     ),
     "regulator_deadband": Kind(
         lambda g, most: {"width_kpa": _log(g, 1.0, 5.0)},
         ("width_kpa",),
-        lambda p: valve.LazyValve(p["width_kpa"] * 1e3),
+        lambda p: drive.LazyValve(p["width_kpa"] * 1e3),
         4.0,
     ),
     "hysteresis": Kind(
         lambda g, most: {"force_n": _log(g, 15.0, 40.0), "distance_mm": _log(g, 1.0, 2.5)},
         ("force_n",),
-        lambda p: friction.MaxwellSlip(p["force_n"], one(p["distance_mm"]) * 1e-3),
+        lambda p: muscle.MaxwellSlip(p["force_n"], one(p["distance_mm"]) * 1e-3),
     ),
     "creep": Kind(
         lambda g, most: {
@@ -176,7 +176,7 @@ KINDS: dict[str, Kind] = {
     "filling": Kind(
         lambda g, most: {"exponent": g.uniform(0.8, 1.4)},
         ("exponent",),
-        lambda p: valve.Squeeze(p["exponent"], 0.25, 0.02, 2.085),
+        lambda p: drive.Squeeze(p["exponent"], 0.25, 0.02, 2.085),
         1.2,
     ),
     "warm_up": Kind(
@@ -241,7 +241,7 @@ KINDS: dict[str, Kind] = {
     "potentiometer_backlash": Kind(
         lambda g, most: {"width_deg": _log(g, 0.3, 2.0)},
         ("width_deg",),
-        lambda p: sensing.LooseSensor(p["width_deg"] * DEGREE),
+        lambda p: outside.LooseSensor(p["width_deg"] * DEGREE),
     ),
     "lvdt_lag": _slow(0, 5.0, 30.0),
     "potentiometer_lag": _slow(1, 5.0, 30.0),
@@ -250,7 +250,7 @@ KINDS: dict[str, Kind] = {
     "sensor_quantisation": Kind(
         lambda g, most: {"signal": float(g.integers(4)), "daq_steps": float(g.integers(2, 9))},
         ("daq_steps",),
-        lambda p: sensing.CoarseSensor(int(one(p["signal"])), p["daq_steps"]),
+        lambda p: outside.CoarseSensor(int(one(p["signal"])), p["daq_steps"]),
         sized=False,
     ),
 }
@@ -319,7 +319,7 @@ LEAKAGE: dict[str, Kind] = {
     "leakage": Kind(
         lambda g, most: {"rate_per_s": _log(g, 0.02, 0.2), "opening_s": _log(g, 2.0, 10.0)},
         ("rate_per_s",),
-        lambda p: valve.OpeningLeak(p["rate_per_s"], one(p["opening_s"])),
+        lambda p: drive.OpeningLeak(p["rate_per_s"], one(p["opening_s"])),
     ),
 }
 """Effects outside the catalogue that only block `slow_drift` hides."""

@@ -24,14 +24,27 @@ from benchmarks.hidden_effects.generation.effect_size import (
     simulate_variants,
 )
 from benchmarks.hidden_effects.generation.effects import ALL, KINDS, Values
-from benchmarks.hidden_effects.generation.experiment_library import named
+from benchmarks.hidden_effects.generation.excitation import LOW_EXCITATION, draw_low_excitation
+from benchmarks.hidden_effects.generation.files import named
 from benchmarks.hidden_effects.generation.groups import group
 from benchmarks.hidden_effects.generation.likelihood_ratios import SEEN, UNTOLD, Behind
-from benchmarks.hidden_effects.generation.low_excitation import LOW_EXCITATION, draw_low_excitation
-from benchmarks.hidden_effects.generation.rigs import RigsBlock
 from benchmarks.hidden_effects.physics import rig as rigs
 from benchmarks.hidden_effects.physics.rig import SENSORS, Array
 from benchmarks.hidden_effects.physics.simulation import RATE, Commands
+
+
+@dataclass(frozen=True)
+class RigsBlock(Block):
+    """Cases of other labs' rigs; of 600 cases 200 hide one effect, 100 two, 200 nothing."""
+
+    def draw(self, seed: int, number: int) -> Case:
+        """Case of a number, 1 and up; the same seed and number give the same bits."""
+        # Here, for no other block needs its simulators.
+        from benchmarks.hidden_effects.rigs.drawing import draw
+
+        texts, truth = draw(seed, number)
+        return Case([], [], [], [], {}, truth, texts)
+
 
 SHOWN = 0.5
 """Ratio r that the witness, an experiment of the library, gives the hidden effect at least."""

@@ -17,8 +17,7 @@ from benchmarks.hidden_effects.generation.cases import BLOCKS, draw_case
 from benchmarks.hidden_effects.generation.effect_size import simulate_variants
 from benchmarks.hidden_effects.generation.effects import ALL, KINDS
 from benchmarks.hidden_effects.generation.excitation import EXCITATIONS, draw_trial
-from benchmarks.hidden_effects.generation.expected_parameters import expected
-from benchmarks.hidden_effects.generation.groups import GROUPS, group
+from benchmarks.hidden_effects.generation.groups import GROUPS, expected, group
 from benchmarks.hidden_effects.physics.rig import NOMINAL, SENSORS, SIGNALS, noise_levels
 from benchmarks.hidden_effects.physics.simulation import RATE, Commands
 from pma_gym.data.trial import Trial

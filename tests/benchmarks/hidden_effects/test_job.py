@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 
 from benchmarks.__main__ import app
 from benchmarks.executors.choice import local
-from benchmarks.hidden_effects import job
+from benchmarks.hidden_effects import run_blocks
 from benchmarks.hidden_effects.evaluation import scoring
 from benchmarks.hidden_effects.evaluation.diagnosis import Answer
 from benchmarks.hidden_effects.evaluation.measured import measured_text, method_digest
@@ -20,12 +20,12 @@ from benchmarks.hidden_effects.evaluation.verdicts import compare, unanswered
 from benchmarks.hidden_effects.generation.blocks import Block
 from benchmarks.hidden_effects.generation.effect_size import simulate_variants
 from benchmarks.hidden_effects.generation.effects import KINDS
-from benchmarks.hidden_effects.generation.experiment_library import random_experiment
+from benchmarks.hidden_effects.generation.files import random_experiment
 from benchmarks.hidden_effects.generation.likelihood_ratios import UNTOLD
 from benchmarks.hidden_effects.generation.undecidable import BLOCKS, SHOWN, draw_undecidable
-from benchmarks.hidden_effects.job import JobError, Order, run_block
 from benchmarks.hidden_effects.physics.rig import noise_levels
 from benchmarks.hidden_effects.physics.simulation import Commands
+from benchmarks.hidden_effects.run_blocks import JobError, Order, run_block
 from tests.benchmarks.hidden_effects.cheap_diagnosis import by_size, document
 
 TINY = Block("nothing", trials=3, seconds=2.0)
@@ -111,9 +111,9 @@ def code_of_first(folder):
 
 
 def test_records_of_other_code_are_used_unless_made_anew(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(job, "fingerprint", lambda: "older")
+    monkeypatch.setattr(run_blocks, "fingerprint", lambda: "older")
     run_block(order(tmp_path, count=1))
-    monkeypatch.setattr(job, "fingerprint", lambda: "newer")
+    monkeypatch.setattr(run_blocks, "fingerprint", lambda: "newer")
     records = run_block(order(tmp_path, count=1))
     assert records is not None and code_of_first(tmp_path) == "older"
     assert "1 of them by other code" in capsys.readouterr().err
@@ -228,7 +228,7 @@ def asking(folder):
 
 def test_what_is_proposed_is_carried_out_on_the_same_rig(case):
     assert follow(case, Answer(document("undecidable")), 2, asking) == {}
-    said = document("undecidable") | {"next_experiment": {"protocol": "a short hold"}}
+    said = document("undecidable") | {"next_experiment": {"excitation": "a short hold"}}
     first = Answer(said, following=(np.full(150, 3.0), np.full(150, 5.0)))
     rounds = follow(case, first, 2, asking)
     assert [len(rounds[way]) for way in ("proposed", "random")] == [1, 1]

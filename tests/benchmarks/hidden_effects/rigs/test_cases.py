@@ -13,11 +13,11 @@ from benchmarks.hidden_effects.generation.files import write_case
 from benchmarks.hidden_effects.generation.undecidable import BLOCKS
 from benchmarks.hidden_effects.rigs import drawing, effect_size, files
 from benchmarks.hidden_effects.rigs.driven_campaign import draw_driven
-from benchmarks.hidden_effects.rigs.lab_names import GERMAN, METRES, OURS
+from benchmarks.hidden_effects.rigs.effect_size import expected
+from benchmarks.hidden_effects.rigs.files import GERMAN, METRES, OURS
 from benchmarks.hidden_effects.rigs.laws import ConstantForce, CoulombFriction, PressureFriction
 from benchmarks.hidden_effects.rigs.offers import KNOWN, OFFERS, catalogue_name, group
 from benchmarks.hidden_effects.rigs.rig import draw_joint, draw_slide
-from benchmarks.hidden_effects.rigs.sizes import expected
 from pma_gym.data.datasets.dataset import read_dataset
 from pma_gym.effects import CATALOGUE
 from tests.benchmarks.hidden_effects.cheap_diagnosis import document

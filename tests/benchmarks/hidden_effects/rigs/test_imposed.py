@@ -10,8 +10,8 @@ from benchmarks.hidden_effects.rigs import laws
 from benchmarks.hidden_effects.rigs.excitation import Reference
 from benchmarks.hidden_effects.rigs.imposed_campaign import draw_tested
 from benchmarks.hidden_effects.rigs.imposed_rig import ImposedRig, draw_imposed
-from benchmarks.hidden_effects.rigs.noise import Noise
 from benchmarks.hidden_effects.rigs.offers import OFFERS
+from benchmarks.hidden_effects.rigs.sensing import Noise
 from benchmarks.hidden_effects.rigs.simulators import imposed_force, mujoco_force
 from pma_gym import Plant, load_model
 from pma_gym.data.datasets.dataset import read_dataset

@@ -7,9 +7,8 @@ import pytest
 
 from benchmarks.hidden_effects.rigs import effect_size, laws
 from benchmarks.hidden_effects.rigs.laws import SensorLink
-from benchmarks.hidden_effects.rigs.noise import Noise
 from benchmarks.hidden_effects.rigs.rig import Rig
-from benchmarks.hidden_effects.rigs.sensing import Sensed, Sensor
+from benchmarks.hidden_effects.rigs.sensing import Noise, Sensed, Sensor
 from benchmarks.hidden_effects.rigs.simulators import stick_slip
 from benchmarks.hidden_effects.rigs.simulators.drive import Drive, Transmission
 
