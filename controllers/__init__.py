@@ -1,7 +1,6 @@
 """Controllers of the benchmark, one a file; `CONTROLLERS` lists them by name."""
 
 from controllers.adrc import ADRC
-from controllers.controller import Controller, Reference
 from controllers.exercise.constant_pressure import ConstantPressure
 from controllers.exercise.exercise_mpc import ExerciseMPC
 from controllers.exercise.moment_pid import MomentPID
@@ -16,7 +15,7 @@ from controllers.oracle import Oracle
 from controllers.pid import PID
 from controllers.policy import Policy, PPOPolicy, ShippedPolicy
 from controllers.policy_with_ilc import PolicyWithILC
-from controllers.registry import CONTROLLERS
+from controllers.registry import CONTROLLERS, Controller, Reference
 from controllers.serres_feedforward import SerresFeedforward
 from controllers.serres_replay import SerresReplay
 from controllers.sliding_mode import SlidingMode

@@ -6,9 +6,12 @@ import numpy as np
 
 from controllers.design.designs import designed
 from controllers.models.nominal_motion import NominalMotion
-from controllers.models.voltage import nominal_offset
-from controllers.observers.extended_state_observer import ExtendedStateObserver, Place
-from controllers.observers.observer_feedback import ObserverFeedback
+from controllers.models.operating_range import nominal_offset
+from controllers.observers.extended_state_observer import (
+    ExtendedStateObserver,
+    ObserverFeedback,
+    Place,
+)
 
 
 class Settings(NamedTuple):
@@ -42,7 +45,7 @@ class ADRC(ObserverFeedback[Settings]):
     """Estimates and cancels the disturbance, then controls the known lag that remains.
 
     Near a place of the stroke the error e of the position against the nominal motion is that of one
-    lag (motor) or two (regulator) behind a dead time (`controllers.models.lag_model`):
+    lag (motor) or two (regulator) behind a dead time (`LagDeadTimeModel`):
 
         prod_i (tau_i d/dt + 1) x = g (v + d),   d'' = 0,   e(t) = x(t - dead time)
 

@@ -1,15 +1,12 @@
 """PID on top of the improved feed-forward."""
 
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
-from controllers.controller import Reference
 from controllers.design.designs import Gains
 from controllers.improved_feedforward import ImprovedFeedforward
-from pma_gym.envs import StationInfo
-
-if TYPE_CHECKING:
-    pass
 from controllers.pid import PID
+from controllers.registry import Reference
+from pma_gym.envs import StationInfo
 
 
 class OpenLoop(Protocol):

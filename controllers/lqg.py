@@ -6,12 +6,11 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from scipy.linalg import solve_discrete_are
 
-from controllers.controller import Reference
 from controllers.design.designs import designed
 from controllers.models.cable import free_rotor
 from controllers.models.local_model import FINE, LocalModel, Stroke
 from controllers.models.nominal_motion import nominal_motion
-from controllers.models.voltage import VOLTAGE_LIMIT
+from controllers.models.operating_range import VOLTAGE_LIMIT
 from controllers.observers.deviation_filter import (
     SHARE,
     SHARE_TIME_S,
@@ -19,6 +18,7 @@ from controllers.observers.deviation_filter import (
     Unknowns,
     with_disturbance,
 )
+from controllers.registry import Reference
 from pma_gym.envs import Measurement, StationInfo
 
 if TYPE_CHECKING:

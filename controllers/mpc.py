@@ -5,15 +5,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from controllers.controller import Reference
 from controllers.design.designs import designed
 from controllers.design.quadratic_program import BoundedProgram
 from controllers.models.linear_motion import linear_motion
 from controllers.models.nominal_motion import nominal_motion
-from controllers.models.operating_range import ModelKey
-from controllers.models.voltage import VOLTAGE_LIMIT
-from controllers.observers.filter_bank import DampingBank
-from controllers.observers.filter_bank_design import BankDesign, bank_design
+from controllers.models.operating_range import VOLTAGE_LIMIT, ModelKey
+from controllers.observers.filter_bank import BankDesign, DampingBank, bank_design
+from controllers.registry import Reference
 from pma_gym.envs import Measurement, StationInfo
 from pma_gym.plant.compiled_model import regulator_voltage
 
@@ -58,7 +56,7 @@ class PreviewMPC:
     Before a trial the nominal plant is simulated under the feed-forward's voltages u_ff and
     linearised on the way (`controllers.models.linear_motion`). In every period, from what a bank of
     Kalman filters knows of the deviations from that motion and of the forces and offsets that the
-    model does not know (`controllers.observers.filter_bank_design`,
+    model does not know (`controllers.observers.filter_bank`,
     `controllers.observers.filter_bank`), it foresees the error at the ends of the coming N periods,
     e = f + G v, linear in the deviations v of their voltages, and chooses
 

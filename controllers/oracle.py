@@ -10,15 +10,19 @@ In every period it plans the voltages of the coming 0.32 s, each in 0-10 V, chan
     sum over times t of (position(t) - reference(t))^2
 
 least, and commands the first of them. At first the times are as dense as those of the scores, then
-10 ms apart and weighted for it (`controllers.design.horizon`); none lies after the trial's end.
+10 ms apart and weighted for it (`controllers.oracle`); none lies after the trial's end.
 Changes of the plan of the period before are searched for by least squares
 (`controllers.design.bounded_least_squares`) with the true plant's own simulation
-(`controllers.models.prediction`). A plan's last period is new each time; there it goes on as the
+(`controllers.oracle`). A plan's last period is new each time; there it goes on as the
 voltages do that the true station's inverse needs for the reference
 (`controllers.models.nominal_motion`). Those voltages themselves are tried too, and pushes of a
 period where the cable hangs loose: it gives no slope to follow.
 
 It is close to the optimum, not proven to be it.
+
+Predict a plant under several voltage sequences at once, from its present state.
+
+Prediction horizon: its length, and the times at which errors count.
 """
 
 import copy
@@ -28,17 +32,154 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from controllers.controller import Reference
 from controllers.design.bounded_least_squares import Errors, Space, best_plan
-from controllers.design.horizon import horizon
 from controllers.models.nominal_motion import nominal_motion
-from controllers.models.prediction import PLANS, Commands, Prediction
-from controllers.models.voltage import VOLTAGE_LIMIT
+from controllers.models.operating_range import VOLTAGE_LIMIT
+from controllers.registry import Reference
 from pma_gym.envs import Measurement, StationInfo
 from pma_gym.units import SI_FACTORS
 
 if TYPE_CHECKING:
     from pma_gym.envs import PMAEnv
+from typing import NamedTuple
+
+from pma_gym.integrator.trial_kernel import JOB
+from pma_gym.metrics import SAMPLE_RATE_HZ
+from pma_gym.plant.plant import Plant
+from pma_gym.plant.statics import Condition
+
+HORIZON_S, LONGEST = 0.32, 64
+"""How far it looks ahead at least (s), and after how many periods that is enough anyway."""
+
+DENSE = 4
+"""Periods whose errors count at every scored sample."""
+
+SPARSE_S = 0.01
+"""Time between the errors that count after them (s), or a period if that is longer."""
+
+
+class Horizon(NamedTuple):
+    """The prediction horizon, by rows of a prediction.
+
+    Attributes:
+        parts: scored samples a period.
+        blocks: which of the plan's voltages is in force in every period, shape (periods,).
+        periods: period of every row, those of commands on their way counted before, shape (rows,).
+        ends: when rows end, from where the plan is in force (periods / parts), shape (rows,).
+        weights: root of how many samples a row's end stands for; 0 before the plan, shape (rows,).
+    """
+
+    parts: int
+    blocks: NDArray[np.int64]
+    periods: NDArray[np.int64]
+    ends: NDArray[np.int64]
+    weights: NDArray[np.float64]
+
+
+def horizon(period: float, delay: int) -> Horizon:
+    """The horizon of a control period (s) and an action delay (periods)."""
+    parts = max(1, round(period * SAMPLE_RATE_HZ))
+    lengths = block_lengths(period)
+    coarse = max(1, min(parts, round(period / SPARSE_S)))
+    counts = np.full(delay + sum(lengths), coarse)
+    counts[:delay], counts[delay : delay + DENSE] = 1, parts
+    periods = np.repeat(np.arange(len(counts)), counts)
+    own = np.arange(len(periods)) - np.repeat(np.cumsum(counts) - counts, counts) + 1
+    ends = (periods - delay) * parts + np.round(own * parts / counts[periods]).astype(int)
+    samples = np.diff(ends, prepend=-delay * parts)
+    weights = np.where(periods < delay, 0.0, np.sqrt(samples))
+    blocks = np.repeat(np.arange(len(lengths)), lengths)
+    return Horizon(parts, blocks, periods, ends, weights)
+
+
+def block_lengths(period: float) -> list[int]:
+    """For how many periods each voltage of a plan is held.
+
+    >>> block_lengths(0.01)
+    [1, 1, 2, 4, 8, 16]
+    """
+    lengths = [1, 1]
+    while sum(lengths) * period < HORIZON_S - 1e-9 and sum(lengths) < LONGEST:
+        lengths.append(2 * lengths[-1])
+    return lengths
+
+
+PLANS = 16
+"""How many plans are tried at once: a whole number of registers of any processor."""
+
+
+class Commands(NamedTuple):
+    """Voltages (V) of both actuators: a number each, or an array of shape (plans, rows)."""
+
+    motor: float | NDArray[np.float64]
+    regulator: float | NDArray[np.float64]
+
+
+class Prediction:
+    """Simulates up to 16 voltage sequences from one state, and reuses the memory of earlier ones.
+
+    The same compiled plant as `Plant.step`, with its arrays made once: of a prediction's 30 us,
+    making them anew would be 200.
+
+    Args:
+        plant: the plant.
+        times: when rows begin, from now, and the last one's end (s), shape (rows + 1,).
+    """
+
+    def __init__(self, plant: Plant, times: NDArray[np.float64]) -> None:
+        self.plant, self.rows = plant, len(times) - 1
+        rows, count = self.rows, len(plant.states)
+        self._time = np.ascontiguousarray(times, float)
+        self._motor, self._regulator = np.zeros((2, PLANS, rows + 1))
+        self._start = np.zeros((PLANS, count + 2))
+        self._states = np.zeros((PLANS, rows + 1, count))
+        self._outputs = np.zeros((PLANS, rows + 1, len(plant.outputs)))
+        self._taken, self._attempts = np.zeros(8, np.int64), np.zeros(8, np.int64)
+        self._jobs = np.zeros((PLANS, len(JOB)), np.int64)
+        for plan in range(PLANS):
+            arrays = (self._motor, self._regulator, self._start, self._states)
+            motor, regulator, start, states = (array[plan].ctypes.data for array in arrays)
+            self._jobs[plan] = (
+                *(rows + 1, 0, self._time.ctypes.data, motor, regulator),
+                *(plant.table.ctypes.data, start, states),
+            )
+        shared = self._jobs, self._taken, self._attempts
+        self._addresses = [array.ctypes.data for array in shared]
+
+    def __deepcopy__(self, memo: dict[int, object]) -> "Prediction":
+        """One with arrays of its own; the compiled plant never changes and is shared."""
+        return Prediction(self.plant, self._time)
+
+    def __call__(
+        self, condition: Condition, commands: Commands, plans: int
+    ) -> dict[str, NDArray[np.float64]]:
+        """True outputs at the end of every row.
+
+        Args:
+            condition: where the plant stands; stays as it is.
+            commands: in force in every row (V), for as many plans.
+            plans: how many, 16 at most.
+        Returns:
+            contraction (m), rotation (rad), load (N), pressure (Pa) and extension (m), of shape
+            (plans, rows) each, until the next call.
+        """
+        zero, count = condition.zero_contraction, len(self.plant.states)
+        self._motor[:plans, :-1], self._regulator[:plans, :-1] = commands
+        self._start[:plans, :count] = condition.state
+        self._start[:plans, count:] = condition.size, zero
+        program = self.plant.program
+        self._taken[0] = 0
+        program.simulate_many(plans, *self._addresses)
+        program.observe(
+            plans * (self.rows + 1),
+            self._states.ctypes.data,
+            zero,
+            self.plant.vector.ctypes.data,
+            self._outputs.ctypes.data,
+        )
+        seen = {name: self._outputs[:plans, 1:, i] for i, name in enumerate(self.plant.outputs)}
+        seen["extension"] = zero - seen["contraction"]
+        return seen
 
 
 PUSHES_V = np.append(0.0, np.geomspace(0.01, 10.0, 13))

@@ -3,12 +3,12 @@
 import math
 from pathlib import Path
 
-from controllers.controller import Reference
 from controllers.design.designs import loop_name, task_kind, warn_of_other_plant
 from controllers.policies.adapter import PolicyAdapter
 from controllers.policies.document import PolicyError
 from controllers.policies.network import Network
 from controllers.policies.policy_file import PolicyFile, load_policy_file
+from controllers.registry import Reference
 from pma_gym.envs import Measurement, StationInfo
 
 POLICIES = Path(__file__).parent / "policies" / "shipped"

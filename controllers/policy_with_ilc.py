@@ -8,13 +8,19 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.linalg import spsolve
 
-from controllers.controller import Reference
 from controllers.design.designs import task_kind
-from controllers.ilc import LEAST_STEPS, LearningGain, LearningTrials, loose_load, tight
-from controllers.models.lifted_model import second_difference
+from controllers.ilc import (
+    LEAST_STEPS,
+    LearningGain,
+    LearningTrials,
+    loose_load,
+    second_difference,
+    tight,
+)
 from controllers.models.nominal_motion import NominalMotion, nominal_motion
 from controllers.policies.document import PolicyError
 from controllers.policy import ShippedPolicy
+from controllers.registry import Reference
 from pma_gym.envs import Measurement, StationInfo
 
 CUTOFF_HZ = 8.0

@@ -4,9 +4,9 @@ import math
 
 import numpy as np
 
-from controllers.controller import Reference
 from controllers.design.designs import must_give_a_position
 from controllers.design.voltage_table import VoltageTable
+from controllers.registry import Reference
 from pma_gym.envs import StationInfo
 from pma_gym.studies.voltage_profile import SAMPLE_TIME, feedforward, reachable_mm
 

@@ -6,8 +6,11 @@ import numpy as np
 
 from controllers.design.designs import designed
 from controllers.models.nominal_motion import NominalMotion
-from controllers.observers.extended_state_observer import ExtendedStateObserver, Place
-from controllers.observers.observer_feedback import ObserverFeedback
+from controllers.observers.extended_state_observer import (
+    ExtendedStateObserver,
+    ObserverFeedback,
+    Place,
+)
 
 
 class Settings(NamedTuple):
@@ -59,7 +62,7 @@ class SlidingMode(ObserverFeedback[Settings]):
     """Drives the error to a surface s = 0, on which it decays, and holds it there.
 
     Near a place of the stroke the error e of the position against the nominal motion is that of one
-    lag (motor) or two (regulator) behind a dead time (`controllers.models.lag_model`), x in what
+    lag (motor) or two (regulator) behind a dead time (`LagDeadTimeModel`), x in what
     follows, in sampled form x(k+1) = A x(k) + b (v(k) + d(k)). The surface is s = c x, with
 
         c x = x,   or   c x = x' + omega_s x   with two lags: on it x dies out as exp(-omega_s t).

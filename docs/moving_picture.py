@@ -9,7 +9,7 @@ from PIL import Image, ImageDraw, ImageFont
 
 import pma_gym  # noqa: F401 - registers the environments
 from controllers import PID, SerresReplay
-from controllers.controller import Controller
+from controllers.registry import Controller
 
 PRESSURE_KPA = 350
 FRAMES_PER_SECOND = 8

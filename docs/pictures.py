@@ -17,7 +17,7 @@ import pma_gym  # noqa: F401 - registers the environments
 from benchmarks.exercise.choice import Choice
 from benchmarks.exercise.choose_device import run_exercise
 from benchmarks.exercise.profile import read_profile
-from benchmarks.hidden_effects.evaluation.pictures import naming_picture
+from benchmarks.hidden_effects.evaluation.scoring import naming_picture
 from controllers import SerresReplay
 from pma_gym.data.datasets.dataset import read_dataset
 from pma_gym.discovery import diagnose

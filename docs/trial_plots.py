@@ -16,8 +16,8 @@ from benchmarks.reproduction.plots import measured_lines
 from benchmarks.runner.phase_score import measured_score, score_trial
 from benchmarks.runner.rollout import make_environment, rollout
 from controllers import PID, SerresReplay
-from controllers.controller import Controller
 from controllers.policy import PPOPolicy
+from controllers.registry import Controller
 from pma_gym.data.datasets.dataset import read_dataset
 from pma_gym.data.serres2008 import pressures
 from pma_gym.data.trial_schedule import SCHEDULES

@@ -8,7 +8,7 @@ from typing import Any, TextIO
 from rich.console import Console, ConsoleOptions, RenderableType
 from rich.segment import Segment
 
-from pma_gym.printable import printable
+from pma_gym.documents import printable
 
 WIDTH = 160
 """Columns of a table where no terminal limits them."""

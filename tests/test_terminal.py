@@ -11,9 +11,9 @@ from typer.testing import CliRunner
 
 from benchmarks.__main__ import app as benchmarks
 from pma_gym.cli import app
+from pma_gym.documents import printable
 from pma_gym.pages.document import Formula, Heading, Paragraph, TextTable, to_html, to_markdown
 from pma_gym.plant.model import shipped_models
-from pma_gym.printable import printable
 from pma_gym.terminal import SafeConsole, safe_streams
 
 EVIL = "a\x1b[31mb\x07\u202e\u2066\x9b[red]x[/red] :smile: \udcff"

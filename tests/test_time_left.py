@@ -3,8 +3,7 @@
 import pytest
 
 from pma_gym.cli import progress as shown
-from pma_gym.cli.progress import StepProgress
-from pma_gym.cli.time_left import DIAGNOSIS, FIT, SHARES, TimeLeft
+from pma_gym.cli.progress import DIAGNOSIS, FIT, SHARES, StepProgress, TimeLeft
 from pma_gym.discovery.workflow import diagnose, refit
 from tests.discovery.laboratory import STATION, laboratory
 

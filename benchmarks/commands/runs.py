@@ -99,7 +99,7 @@ def run(
     from benchmarks.suites.frozen import frozen_suite
     from benchmarks.suites.reproduction import ReproductionSuite
     from benchmarks.suites.suite import SuiteError
-    from pma_gym.data.readers.libraries import needed
+    from pma_gym.data.files.trial_formats import needed
     from pma_gym.data.trial import TrialError
     from pma_gym.terminal import SafeConsole
 
@@ -222,7 +222,7 @@ def remove(
 ) -> None:
     """Take a controller's rows out of the journals; the rows of all others stay unchanged."""
     from benchmarks.comparison.command_lines import report_command
-    from benchmarks.comparison.remove import remove_controller
+    from benchmarks.comparison.job import remove_controller
     from benchmarks.suites.frozen import frozen_suite, suite_names
     from benchmarks.suites.suite import SuiteError
 
@@ -239,7 +239,7 @@ def remove(
 
 def suites(as_json: JsonOption = False) -> None:
     """List the frozen suites: their versions, cases and controllers."""
-    from benchmarks.comparison.listing import print_suites, suite_documents
+    from benchmarks.comparison.job import print_suites, suite_documents
     from pma_gym.terminal import SafeConsole
 
     if as_json:

@@ -1,18 +1,29 @@
-"""`python -m benchmarks run`: compare controllers on a frozen suite, and go on where it stopped."""
+"""`python -m benchmarks run`: compare controllers on a frozen suite, and go on where it stopped.
 
+`python -m benchmarks suites`: what can be run.
+
+`python -m benchmarks remove`: take a controller's rows out of journals; all others stay.
+"""
+
+import difflib
+import json
 from collections.abc import Sequence
 from pathlib import Path
 
 from rich.console import Console
+from rich.table import Table
 
+from benchmarks.comparison.add import print_scores, write_scores
 from benchmarks.comparison.command_lines import report_command
-from benchmarks.comparison.scores import print_scores, write_scores
 from benchmarks.executors.executor import Executor
 from benchmarks.report.leaderboard import keep_bounds
+from benchmarks.runner.case import cases
 from benchmarks.runner.controller_spec import ControllerError, parse_controllers
+from benchmarks.runner.journal import JOURNAL, rewrite
+from benchmarks.runner.provenance import read_run, write_run
 from benchmarks.runner.run import FAILED, INTERRUPTED, run_missing
-from benchmarks.suites.frozen import frozen_suite
-from benchmarks.suites.suite import Entry, FrozenSuite
+from benchmarks.suites.frozen import frozen_suite, suite_names
+from benchmarks.suites.suite import Entry, FrozenSuite, SuiteError
 
 
 def chosen(suite: FrozenSuite, controllers: str) -> list[Entry]:
@@ -71,3 +82,108 @@ def run_comparison(
         console.print("Interrupted: all cases are done; the report computes the bounds.")
     console.print(f"Leaderboard: {report_command(suite, out)}", highlight=False)
     return FAILED if any(row["failure"] for row in run.rows) else 0
+
+
+def print_suites(console: Console) -> None:
+    """A table of the suites and of who is compared on them."""
+    table = Table("suite", "version", "stations", "episodes", "cases", "tasks")
+    frozen = [frozen_suite(name) for name in suite_names()]
+    for suite in frozen:
+        table.add_row(
+            suite.name,
+            str(suite.version),
+            str(len(suite.stations)),
+            str(len(suite.episodes)),
+            str(len(cases(suite, suite.entries))),
+            str(len(suite.tasks)),
+        )
+    console.print(table)
+    for suite in frozen:
+        names = ", ".join(entry.spec.name for entry in suite.entries)
+        console.print(f"{suite.name}: {suite.title} ({_control(suite)})", highlight=False)
+        console.print(f"  tasks: {', '.join(suite.tasks)}", highlight=False)
+        console.print(f"  controllers: {names}", highlight=False)
+
+
+def suite_documents() -> list[dict[str, object]]:
+    """The frozen suites for programs: version, size, tasks and controllers."""
+    return [
+        {
+            "name": suite.name,
+            "version": suite.version,
+            "title": suite.title,
+            "stations": len(suite.stations),
+            "episodes": len(suite.episodes),
+            "cases": len(cases(suite, suite.entries)),
+            "tasks": list(suite.tasks),
+            "controllers": [entry.spec.name for entry in suite.entries],
+            "control_rate_hz": suite.control_rate_hz,
+        }
+        for suite in map(frozen_suite, suite_names())
+    ]
+
+
+def _control(suite: FrozenSuite) -> str:
+    """Rate and delays, for people."""
+    words = [f"{suite.control_rate_hz:g} Hz"]
+    for name, what in (("action_delay_s", "commands"), ("observation_delay_s", "readings")):
+        delay = suite.environment.get(name, 0.0)
+        words += [f"{what} {1e3 * delay:g} ms late"] if delay else []
+    return ", ".join(words)
+
+
+def remove_controller(name: str, suites: Sequence[FrozenSuite], results: Path) -> dict[Path, int]:
+    """Take a controller out of the results of suites.
+
+    Each journal is replaced as a whole by one in which every other line has the same bytes, damaged
+    lines included; what `run.json` says of the controller goes too. Pages stay until `report`.
+
+    Args:
+        name: of the controller, as the journal has it.
+        suites: whose folders are looked at.
+        results: folder with a folder of results for each suite.
+    Returns:
+        How many rows were taken out of each journal that had some.
+    Raises:
+        SuiteError: no journal has any, or a run is writing to one.
+    """
+    journals = [results / suite.name / JOURNAL for suite in suites]
+    known = {path: _names(path) for path in journals if path.is_file()}
+    if not any(name in names for names in known.values()):
+        raise SuiteError(_unknown(name, known, results))
+    return {path: _removed(name, path) for path, names in known.items() if name in names}
+
+
+def _removed(name: str, path: Path) -> int:
+    count = rewrite(path, lambda line: _controller(line) != name)
+    info = read_run(path.parent)
+    specs = info.get("contenders")
+    if isinstance(specs, dict) and name in specs:
+        rest = {each: entry for each, entry in specs.items() if each != name}
+        write_run(path.parent, info, contenders=rest)
+    return count
+
+
+def _controller(line: bytes) -> str | None:
+    """Whose row a line is; None for a damaged one."""
+    try:
+        row = json.loads(line)
+    except (ValueError, RecursionError):
+        return None
+    name = row.get("controller") if isinstance(row, dict) else None
+    return name if isinstance(name, str) else None
+
+
+def _names(path: Path) -> set[str]:
+    with path.open("rb") as lines:
+        return {name for line in lines if (name := _controller(line)) is not None}
+
+
+def _unknown(name: str, known: dict[Path, set[str]], results: Path) -> str:
+    every = sorted(set().union(*known.values()))
+    if not every:
+        return f"{results} has no journal of these suites; name the folder by --results"
+    near = difflib.get_close_matches(name, every, 1)
+    hint = f"; did you mean {near[0]}?" if near else ""
+    where = ", ".join(map(str, known))
+    return f"no rows of {name!r} in {where}; they have rows of {', '.join(every)}{hint}"

@@ -4,8 +4,7 @@ from dataclasses import dataclass
 from itertools import product
 
 from pma_gym.numerals import parse_numbers
-from pma_gym.plant.exercise_device.device import RADIUS, Device, own_device
-from pma_gym.plant.exercise_device.parallel_muscles import MusclesError, muscles
+from pma_gym.plant.exercise_device.device import RADIUS, Device, MusclesError, muscles, own_device
 from pma_gym.plant.model import Model
 
 SEARCHED = {"muscles": range(1, 7), "diameter": (10, 20, 40), "length": (150, 200, 250, 300, 400)}

@@ -9,8 +9,13 @@ from pma_gym.pages.document import TextTable
 from pma_gym.plant.exercise_device.device import Device, own_device, resistive_moment
 from pma_gym.plant.exercise_device.knee import knee_extension_torque
 from pma_gym.plant.model import Model
-from pma_gym.studies.makers_figures import makers_figures
-from pma_gym.studies.moment_ranges import Span, check_moments, lowest_rest_pressure, span
+from pma_gym.studies.moment_ranges import (
+    Span,
+    check_moments,
+    lowest_rest_pressure,
+    makers_figures,
+    span,
+)
 from pma_gym.units import SI_FACTORS
 
 _DEG = SI_FACTORS["deg"]

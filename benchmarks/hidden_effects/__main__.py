@@ -13,7 +13,10 @@ from pma_gym.terminal import safe_streams
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 from benchmarks.hidden_effects import speed as timing  # noqa: E402
-from benchmarks.hidden_effects.evaluation import diagnosed_cases, scoring  # noqa: E402
+from benchmarks.hidden_effects.evaluation import (
+    records,  # noqa: E402
+    scoring,
+)
 from benchmarks.hidden_effects.generation import drawing  # noqa: E402
 from benchmarks.hidden_effects.generation.cases import BLOCKS  # noqa: E402
 from benchmarks.hidden_effects.generation.effects import ALL  # noqa: E402
@@ -82,7 +85,7 @@ def judge(
     limit: Annotated[float, typer.Option(help="Seconds after which a case is given up.")] = 900.0,
 ) -> None:
     """Diagnose every case that has no answer yet."""
-    diagnosed_cases.judge(folder, jobs, options.split(), limit)
+    records.judge(folder, jobs, options.split(), limit)
 
 
 @app.command()

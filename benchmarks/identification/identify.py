@@ -16,7 +16,7 @@ from benchmarks.executors.executor import run_or_raise
 from benchmarks.files import write_text
 from benchmarks.identification import statics, station
 from benchmarks.identification.creep import STUDENT_10, CreepFold, decided, load_cycle_with_creep
-from benchmarks.identification.measurements import StationLimits, station_limits
+from benchmarks.identification.statics import StationLimits, station_limits
 from benchmarks.identification.station import fitted_parameters, identify, leave_out
 from benchmarks.identification.transients import PressureSteps, pressure_steps
 from pma_gym.plant.model import Model, dump_model

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from benchmarks.identification import measurements, statics
+from benchmarks.identification import statics
 from benchmarks.identification.creep import CREEP, HELD, load_cycle_with_creep
-from benchmarks.identification.measurements import StationLimits, static_loading
+from benchmarks.identification.statics import StationLimits, static_loading
 from benchmarks.identification.transients import PressureSteps, step_residuals
 from pma_gym.effects import CATALOGUE
 from pma_gym.plant.model import Model, load_model
@@ -40,7 +40,7 @@ def left_out(
     """Errors of a model at rows of one pressure, whose load cycle something predicts."""
     predicted = predict(model, data.pressure, data.load)
     rotor, cable = model.parameters["rotor"], model.parameters["cable"]
-    pulley = measurements.Pulley(rotor.radius, cable.stiffness, cable.slack)
+    pulley = statics.Pulley(rotor.radius, cable.stiffness, cable.slack)
     rotation = pulley.rotation(predicted.extension, data.load) - data.rotation
     return LeftOut(
         pressure=float(data.pressure[0]),
@@ -174,8 +174,8 @@ def identify(
     Returns:
         The station's model.
     """
-    values = measurements.drive_line(data) | measurements.regulator_line(data)
-    values |= measurements.pulley_parameters(measurements.fit_pulley(data))
+    values = statics.drive_line(data) | statics.regulator_line(data)
+    values |= statics.pulley_parameters(statics.fit_pulley(data))
     model = template().replace(values)
     model = model.replace({"cable.damping_n_s_per_mm": cable_damping(model)})
     if not creeps:

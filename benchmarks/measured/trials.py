@@ -16,7 +16,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from benchmarks.identification.measurements import StationLimits, station_limits
+from benchmarks.identification.statics import StationLimits, station_limits
 from pma_gym.data.datasets.dataset import Dataset, NamedTrial
 from pma_gym.data.serres2008 import load_table
 from pma_gym.data.trial import Trial

@@ -2,7 +2,7 @@
 
 The loop is that of the nominal plant, linearised near rest at a place of the stroke, sampled at the
 control rate with the sensor's lag and all delays in it (`benchmarks.tuning.loop_margins`), and of
-the controller's own linear law (`controllers.controller.LinearController`). The task's actuator,
+the controller's own linear law (`controllers.registry.LinearController`). The task's actuator,
 motor or regulator, closes it. What is not in it: voltage limits, feed-forward, hysteresis and dry
 friction, and how gains change as the reference moves.
 """
@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.tuning.loop_margins import STROKES, Place, linearised, sampled
-from controllers.controller import Controller, LinearController
+from controllers.registry import Controller, LinearController
 from pma_gym.envs import StationInfo
 
 FREQUENCIES = 600

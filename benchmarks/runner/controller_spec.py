@@ -7,14 +7,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-import controllers.controller
+import controllers.registry
 from controllers import CONTROLLERS
-from controllers.controller import Controller
 from controllers.policies.policy_file import PolicyError, policy_pair
 from controllers.policy import POLICIES, Policy, ShippedPolicy, shipped_policies
+from controllers.registry import Controller
 from pma_gym.cli.controller_source import ControllerSourceError, class_in_file
 
-CONTROLLER_INTERFACE = Path(controllers.controller.__file__)
+CONTROLLER_INTERFACE = Path(controllers.registry.__file__)
 """File that says what a controller is."""
 
 POLICY_FILES = (".json", ".safetensors")
@@ -229,7 +229,7 @@ def _same_file(name: str, path: Path) -> bool:
 
 
 def _check_interface(spec: ControllerSpec, controller: object) -> None:
-    """Refuse an object that is no `controllers.controller.Controller`."""
+    """Refuse an object that is no `controllers.registry.Controller`."""
     for method, arguments in (("reset", "(reference, station)"), ("act", "(observation, time)")):
         function = getattr(controller, method, None)
         if not callable(function):

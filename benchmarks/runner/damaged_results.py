@@ -4,7 +4,7 @@ import sys
 from functools import cache
 from pathlib import Path
 
-from pma_gym.printable import printable
+from pma_gym.documents import printable
 
 UNREADABLE = (
     OSError,

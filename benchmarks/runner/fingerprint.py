@@ -24,7 +24,7 @@ SOURCES = (
     "benchmarks/executors/failures.py",
     "benchmarks/executors/lifetime.py",
     "benchmarks/executors/work.py",
-    "benchmarks/runner/controller_process.py",
+    "benchmarks/runner/isolated_controller.py",
     "benchmarks/suites/stations.py",
     "benchmarks/runner/case.py",
     "benchmarks/runner/figures.py",

@@ -1,24 +1,71 @@
-"""Provenance of a run, stored beside its scores for reports."""
+"""Provenance of a run, stored beside its scores for reports.
+
+Environment of a result, to reproduce it: versions, commit, machine.
+"""
 
 import json
+import os
+import platform
 import shlex
+import subprocess
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from datetime import UTC, datetime
+from importlib import metadata
 from pathlib import Path
 from typing import Any
 
 from benchmarks.files import write_text
 from benchmarks.runner.case import Row
 from benchmarks.runner.damaged_results import say_damaged
-from benchmarks.runner.environment_info import environment_info
 from benchmarks.runner.execution import PendingCases, row_identity
 from benchmarks.runner.fingerprint import code_digest
 from benchmarks.runner.journal import JOURNAL, case_rows
 from benchmarks.suites.suite import Entry, FrozenSuite, SuiteError
 from pma_gym.document_shape import ShapeError, Whole, check_shape
 from pma_gym.documents import read_json
+
+ROOT = Path(__file__).resolve().parents[2]
+PACKAGES = ("numpy", "scipy", "llvmlite", "gymnasium", "pma_gym")
+
+
+def environment_info() -> dict[str, object]:
+    """Versions of Python and of the packages that figures depend on, commit and machine."""
+    versions = {name: metadata.version(name.replace("_", "-")) for name in PACKAGES}
+    return {
+        "versions": {"python": platform.python_version(), **versions},
+        "git": git_state(ROOT),
+        "platform": platform.platform(),
+        "processors": os.cpu_count(),
+    }
+
+
+def git_state(folder: Path) -> dict[str, object]:
+    """Commit of the clone in a folder, and whether files differ from it.
+
+    Returns:
+        `commit` and `dirty`; "unknown" and None where the folder is no clone's root, or git is
+        missing.
+    """
+    top = _git(folder, "rev-parse", "--show-toplevel")
+    commit = _git(folder, "rev-parse", "HEAD")
+    # A copy inside somebody else's repository has not that repository's commit.
+    if not top or not commit or Path(top).resolve() != folder.resolve():
+        return {"commit": "unknown", "dirty": None}
+    return {"commit": commit, "dirty": bool(_git(folder, "status", "--porcelain"))}
+
+
+def _git(folder: Path, *arguments: str) -> str | None:
+    """What git says; None if it fails or is not installed."""
+    try:
+        done = subprocess.run(
+            ["git", "-C", str(folder), *arguments], capture_output=True, text=True, timeout=20
+        )
+    except (OSError, subprocess.TimeoutExpired):
+        return None
+    return done.stdout.strip() if done.returncode == 0 else None
+
 
 RUN, STATIONS = "run.json", "stations.json"
 SCHEMA = 1

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.runner.controller_spec import ControllerError
-from controllers.controller import Controller
+from controllers.registry import Controller
 from pma_gym.data.signals import SIGNALS
 from pma_gym.data.trial import Trial
 from pma_gym.engine.actions import HIGHEST_VOLTAGE

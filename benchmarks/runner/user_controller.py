@@ -5,7 +5,7 @@ from collections import deque
 from pathlib import Path
 
 from benchmarks.runner.controller_spec import ControllerError, ControllerSpec, raised_at
-from controllers.controller import Reference
+from controllers.registry import Reference
 from pma_gym.envs import Measurement, StationInfo
 
 MAKE_S, RESET_S, ACT_S = 60.0, 60.0, 2.0

@@ -20,7 +20,7 @@ from rich.console import Console
 from rich.table import Table
 
 from benchmarks.files import write_text
-from benchmarks.runner.environment_info import environment_info
+from benchmarks.runner.provenance import environment_info
 from benchmarks.speed.peers import ROOT, Row, all_rows
 from pma_gym.files import OutputError, check_output
 from pma_gym.terminal import SafeConsole

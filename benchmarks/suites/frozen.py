@@ -24,8 +24,8 @@ from benchmarks.suites.suite import (
 from pma_gym.document_shape import ListOf, Maybe, Real, Whole, check_shape
 from pma_gym.documents import DocumentError, is_file, read_toml
 from pma_gym.engine.options import parse_options
+from pma_gym.files import is_path, missing_file
 from pma_gym.limits import LimitError
-from pma_gym.paths import is_path, missing_file
 from pma_gym.tasks import EVERY_TASK, named_task
 
 SCHEMA = 2

@@ -11,7 +11,7 @@ from typing import Any, ClassVar
 from benchmarks.runner.controller_spec import ControllerSpec
 from benchmarks.suites.stations import DrawnStation
 from benchmarks.suites.suite import Entry, Episode, EpisodePlan, FrozenSuite, SuiteError
-from pma_gym.paths import is_path
+from pma_gym.files import is_path
 from pma_gym.plant.model import Model, dump_model, load_model
 
 MEASURED = "Measured"

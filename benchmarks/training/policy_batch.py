@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvObs, VecEnvStepReturn
 
 from benchmarks.training.reward import bounded
-from controllers.policies.action_mapping import HIGHEST_V, ActionMapping
-from controllers.policies.batch_adapter import BatchPolicyAdapter
+from controllers.policies.adapter import HIGHEST_V, ActionMapping, BatchPolicyAdapter
 from controllers.policies.observation_spec import ObservationSpec
 from pma_gym.engine.observation import BOUND
 from pma_gym.envs import PMAVectorEnv, StationInfo

@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 
 from benchmarks.training.reward import bounded
 from benchmarks.training.stations import Stations
-from controllers.policies.action_mapping import ActionMapping
-from controllers.policies.adapter import PolicyAdapter
+from controllers.policies.adapter import ActionMapping, PolicyAdapter
 from controllers.policies.observation_spec import ObservationSpec
 from pma_gym.engine.observation import BOUND
 from pma_gym.envs import PMAEnv

@@ -10,11 +10,11 @@ import numpy as np
 
 from benchmarks.tuning.loop_margins import Loop
 from benchmarks.tuning.tuning_task import Job
-from controllers.controller import Reference
 from controllers.design.designs import Gains
 from controllers.feedforward_pid import FeedforwardPID
 from controllers.models.nominal_motion import NominalMotion, nominal_motion
 from controllers.pid import PID
+from controllers.registry import Reference
 from pma_gym.effects.effect import Value
 from pma_gym.envs import PMAEnv, StationInfo
 from pma_gym.plant.model import Model

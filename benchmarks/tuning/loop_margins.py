@@ -10,14 +10,14 @@ from scipy.optimize import root_scalar
 
 from benchmarks.tuning.tuning_task import Job
 from controllers.design.designs import Gains
-from controllers.models.voltage import nominal_offset
+from controllers.models.operating_range import nominal_offset
 from controllers.pid import PID, linear_law
 from pma_gym.data.signals import SIGNALS
 from pma_gym.engine.nominal_rig import motor_at_rest
 from pma_gym.envs import StationInfo
-from pma_gym.plant.condition import Condition
 from pma_gym.plant.forms.linear import linearize_at, operating_point
 from pma_gym.plant.plant import Plant
+from pma_gym.plant.statics import Condition
 from pma_gym.tasks import Actuator
 
 """Sensor by what is followed."""

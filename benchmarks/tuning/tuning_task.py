@@ -7,7 +7,7 @@ from typing import Any
 
 from benchmarks.files import write_text
 from benchmarks.runner.damaged_results import say_damaged
-from benchmarks.runner.environment_info import ROOT, git_state
+from benchmarks.runner.provenance import ROOT, git_state
 from controllers.design.designs import Gains, loop_name, task_kind
 from controllers.pid import PID
 from pma_gym.data.trial_schedule import TrialSchedule

@@ -4,8 +4,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from controllers.controller import Reference
 from controllers.exercise.resistance import ANGLES, PRESSURES, Resistance, exercise_of, volts_of
+from controllers.registry import Reference
 from pma_gym.envs import Measurement, StationInfo
 
 if TYPE_CHECKING:

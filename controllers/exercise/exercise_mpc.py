@@ -5,13 +5,21 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from controllers.controller import Reference
 from controllers.design.quadratic_program import BoundedProgram
-from controllers.exercise.joint_prediction import Horizon, Joint, Program, programmed
-from controllers.exercise.leg_observer import LegObserver, PressureObserver, ProcessNoise, leg_of
+from controllers.exercise.leg_observer import (
+    Horizon,
+    Joint,
+    LegObserver,
+    PressureObserver,
+    ProcessNoise,
+    Program,
+    leg_of,
+    programmed,
+)
 from controllers.exercise.resistance import Resistance, exercise_of, pressures_of, volts_of
+from controllers.registry import Reference
 from pma_gym.envs import Measurement, StationInfo
-from pma_gym.tasks.exercise import PACE
+from pma_gym.tasks.exercises import PACE
 
 Array = NDArray[np.float64]
 
@@ -45,7 +53,7 @@ class ExerciseMPC:
 
     From what the observers (`controllers.exercise.leg_observer`) make of the last reading, with the
     commands on their way, it foresees the errors e of the coming half second, linear in the
-    commands v (`controllers.exercise.joint_prediction`), and chooses
+    commands v (`controllers.exercise.leg_observer`), and chooses
 
         min  |e|^2 / n + rho * sum over i of (v_i - v_(i-1))^2,   0 <= V <= 10 V
 

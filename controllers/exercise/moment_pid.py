@@ -5,7 +5,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from controllers.controller import Reference
 from controllers.exercise.resistance import (
     ANGLES,
     Arrival,
@@ -15,6 +14,7 @@ from controllers.exercise.resistance import (
     volts_of,
 )
 from controllers.exercise.scheduled_pressure import schedule
+from controllers.registry import Reference
 from pma_gym.envs import Measurement, StationInfo
 
 

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from controllers.controller import Reference
 from controllers.exercise.resistance import ANGLES, exercise_of, volts_of
+from controllers.registry import Reference
 from pma_gym.envs import Measurement, StationInfo
 from pma_gym.plant.exercise_device.device import own_device
 from pma_gym.plant.exercise_device.prescription import follow_from

@@ -2,8 +2,8 @@
 
 from typing import NamedTuple
 
-from controllers.controller import Reference
 from controllers.exercise.resistance import Arrival, JointSpeed, Resistance, exercise_of, volts_of
+from controllers.registry import Reference
 from pma_gym.envs import Measurement, StationInfo
 
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from controllers.design.designs import EXERCISE_KINDS, KINDS
-from controllers.policies.action_mapping import ActionMapping
+from controllers.policies.adapter import ActionMapping
 from controllers.policies.network import ACTIVATIONS, OUTPUTS
 from controllers.policies.observation_spec import ObservationSpec
 from pma_gym.documents import parse_json

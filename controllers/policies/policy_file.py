@@ -15,13 +15,12 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from controllers.policies.action_mapping import ActionMapping
+from controllers.policies.adapter import ActionMapping
 from controllers.policies.document import SCHEMA, PolicyError, parsed_document
 from controllers.policies.network import Weights, check_chain
 from controllers.policies.observation_spec import ObservationSpec
 from controllers.policies.tensors import safetensors, tensors_of, weights_of
-from pma_gym.files import replace_files
-from pma_gym.paths import as_path
+from pma_gym.files import as_path, replace_files
 
 __all__ = ["PolicyError", "PolicyFile", "load_policy_file", "policy_pair", "save_policy_file"]
 

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from benchmarks.identification.measurements import station_limits
+from benchmarks.identification.statics import station_limits
 from benchmarks.identification.station import TARGETS
 from generators.text import code, number, table
 from pma_gym.effects import CATALOGUE

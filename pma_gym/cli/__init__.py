@@ -10,18 +10,23 @@ import numpy as np
 import typer
 
 from pma_gym.cli.comparison import compare
-from pma_gym.cli.completion import NamedModel, dissertation_tasks, model_names
 from pma_gym.cli.convert import convert
 from pma_gym.cli.discovery import diagnose, fit
-from pma_gym.cli.information import (
+from pma_gym.cli.options import JsonOption, StrictTyper
+from pma_gym.cli.terminal import (
+    NamedModel,
+    console,
+    dissertation_tasks,
     installation,
     model_document,
+    model_names,
     print_installation,
+    print_json,
     print_model,
     print_version,
+    read,
+    say,
 )
-from pma_gym.cli.options import JsonOption, StrictTyper
-from pma_gym.cli.terminal import console, print_json, read, say
 from pma_gym.cli.watch import watch
 from pma_gym.data.files.trial_files import check_writable, place_in_file, write_trial
 from pma_gym.data.trial import Trial, TrialError

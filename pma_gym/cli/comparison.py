@@ -6,9 +6,8 @@ from typing import Annotated
 import typer
 from rich.table import Table
 
-from pma_gym.cli.completion import model_names
 from pma_gym.cli.options import JsonOption
-from pma_gym.cli.terminal import console, print_json, say, warnings_said
+from pma_gym.cli.terminal import console, model_names, print_json, say, warnings_said
 from pma_gym.data.datasets.dataset import read_dataset
 from pma_gym.plant.model import load_model
 

@@ -15,7 +15,7 @@ class ControllerSourceError(ValueError):
 
 
 class Runnable(Protocol):
-    """Interface of a controller; see `controllers.controller` in a clone."""
+    """Interface of a controller; see `controllers.registry` in a clone."""
 
     def reset(self, reference: Reference, station: StationInfo) -> None:
         """Prepare for a trial."""

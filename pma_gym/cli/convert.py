@@ -9,9 +9,8 @@ import typer
 from rich.table import Table
 from rich.text import Text
 
-from pma_gym.cli.completion import model_names
 from pma_gym.cli.options import JsonOption
-from pma_gym.cli.terminal import console, print_json, say
+from pma_gym.cli.terminal import console, model_names, print_json, say
 from pma_gym.data.datasets.dataset import read_dataset
 from pma_gym.data.datasets.dataset_toml import DESCRIPTION, Description
 from pma_gym.data.datasets.drafting import SeenColumn, draft, one_line, seen_columns

@@ -11,8 +11,8 @@ from typing import Annotated, Any, NoReturn, get_args, get_type_hints
 import typer
 from typer.core import TyperCommand, TyperGroup
 
+from pma_gym.documents import printable
 from pma_gym.numerals import parse_number
-from pma_gym.printable import printable
 
 _Option = type(typer.Option())
 

@@ -10,8 +10,8 @@ import math
 import operator
 from typing import Any
 
+from pma_gym.codegen.folding import MASK, NUMPY
 from pma_gym.codegen.generic import floor, from_bits, sloping, square_root, to_bits, to_real, where
-from pma_gym.codegen.value import MASK, NUMPY
 
 _LN2_HIGH, _LN2_LOW = 6.93147180369123816490e-01, 1.90821492927058770002e-10
 """The logarithm of 2 in two parts, of which a whole number times the first is exact."""

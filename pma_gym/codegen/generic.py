@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from pma_gym.codegen.folding import compute
-from pma_gym.codegen.value import Value
+from pma_gym.codegen.folding import Value, compute
 
 
 def where(condition: Any, yes: Any, no: Any) -> Any:  # noqa: ANN401

@@ -9,8 +9,7 @@ import struct
 from typing import Any
 
 from pma_gym.codegen import elementary  # noqa: F401 - fills the functions of values
-from pma_gym.codegen.folding import simplify
-from pma_gym.codegen.value import (
+from pma_gym.codegen.folding import (
     CHANGING,
     COMPARISONS,
     CONSTANT,
@@ -21,6 +20,7 @@ from pma_gym.codegen.value import (
     Number,
     Value,
     ValueGraph,
+    simplify,
 )
 
 __all__ = ["CHANGING", "CONSTANT", "FIXED", "HELD", "Graph", "Kind", "Number", "Value"]

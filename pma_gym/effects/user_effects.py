@@ -34,7 +34,7 @@ from typing import NamedTuple
 
 from pma_gym.effects import CATALOGUE, Effect
 from pma_gym.effects.user_effect_checks import broken_rule, numbers
-from pma_gym.paths import as_path
+from pma_gym.files import as_path
 
 NAMED = "PMA_GYM_EFFECTS"
 """Environment variable with files of effects, separated as in PATH; `load_effects` adds to it."""

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pma_gym.codegen.machine import arrays
-from pma_gym.codegen.machine.builtin import builtin
+from pma_gym.codegen.machine.native import builtin
 from pma_gym.codegen.threads.thread_pool import ThreadPool
 from pma_gym.engine.cpu.block_memory import ARGUMENTS
 from pma_gym.engine.cpu.python_step import BOUND

@@ -14,8 +14,8 @@ from pma_gym.engine.options import Options
 from pma_gym.engine.state_layout import HAND_PUSH, PARTS, START, TRUTH
 from pma_gym.envs.station_info import Measurement, Reference, StationInfo, detached_task
 from pma_gym.envs.summary import episode_summary
-from pma_gym.plant.condition import Condition
 from pma_gym.plant.plant import Plant
+from pma_gym.plant.statics import Condition
 from pma_gym.tasks import Events, Operator, Task
 
 NOT_BEGUN = "no episode has begun"

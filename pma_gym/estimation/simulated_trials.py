@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 from pma_gym.data.trial import Trial
 from pma_gym.effects.ports import SENSOR_DELAY
 from pma_gym.estimation import initial_states
-from pma_gym.estimation.free_parameters import free_parameters
-from pma_gym.estimation.logged import Logged
+from pma_gym.estimation.logged import Logged, free_parameters
 from pma_gym.integrator.equations import Interpolation, check_interpolation
 from pma_gym.plant import memory_start, sensors
 from pma_gym.plant.compiled_model import DEFAULT_TOLERANCE

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from itertools import groupby
 from pathlib import Path
 
+from pma_gym.documents import printable
 from pma_gym.pages.interactive import InteractiveFigure, scripts
-from pma_gym.printable import printable
 
 
 @dataclass(frozen=True)

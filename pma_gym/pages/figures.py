@@ -11,8 +11,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.backends.registry import BackendFilter, backend_registry
 from matplotlib.figure import Figure
 
+from pma_gym.documents import printable
 from pma_gym.pages.document import DPI, Block, html_block
-from pma_gym.printable import printable
 
 # Colours come from the notebook, so that they fit its light and its dark theme.
 _STYLE = """<style>

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from pma_gym.printable import printable
+from pma_gym.documents import printable
 
 _HERE = Path(__file__).parent
 _MARKED = 30

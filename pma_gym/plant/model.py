@@ -24,8 +24,8 @@ from pma_gym.effects.user_effects import (
     source_of,
     sources_of,
 )
+from pma_gym.files import is_path, missing_file
 from pma_gym.limits import LimitError
-from pma_gym.paths import is_path, missing_file
 from pma_gym.plant.parameter_rows import LINE_FORM, Note, ParameterRow, toml_text
 from pma_gym.plant.rigs import RIGS, Rig
 

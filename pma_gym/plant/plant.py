@@ -9,10 +9,10 @@ from pma_gym.data.trial import Trial
 from pma_gym.integrator.equations import Interpolation, check_interpolation
 from pma_gym.plant import sensors
 from pma_gym.plant.compiled_model import CompiledModel
-from pma_gym.plant.condition import Condition, check_commands
 from pma_gym.plant.equilibrium.solver import equilibrium_at
 from pma_gym.plant.memory_start import begun_at
 from pma_gym.plant.simulation import Run, simulate_all
+from pma_gym.plant.statics import Condition, check_commands
 
 if TYPE_CHECKING:
     import control

@@ -17,8 +17,8 @@ def compare_all() -> list[Comparison]:
         compare_contraction,
         compare_profiles,
         compare_relaxation,
+        compare_static_loading,
     )
-    from pma_gym.studies.line_analysis import compare_static_loading
     from pma_gym.studies.recursion import compare_recursion
     from pma_gym.studies.station_limits import compare_station_limits
     from pma_gym.studies.trials import compare_trials

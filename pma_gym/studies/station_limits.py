@@ -15,7 +15,7 @@ from pma_gym.studies.comparison import (
     rounding_reach,
 )
 from pma_gym.studies.contraction import SPRING_SPLIT_KPA
-from pma_gym.studies.position_voltage import Quadratic, printed_quadratics, used_quadratics
+from pma_gym.studies.voltage_profile import Quadratic, printed_quadratics, used_quadratics
 
 STUDY = "station limits"
 

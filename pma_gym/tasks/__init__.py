@@ -1,17 +1,18 @@
 """Tasks: what to follow, what it is worth, when it ends, what is drawn and what disturbs."""
 
 from pma_gym.tasks.disturbances import DISTURBANCES, PULSE_S, Disturbances, Events
-from pma_gym.tasks.exercise import LOWEST_RATE_HZ, PACE, PLAN_ANGLES, Exercise
 from pma_gym.tasks.exercises import (
     EXERCISES,
+    LOWEST_RATE_HZ,
+    PACE,
+    PLAN_ANGLES,
+    Exercise,
     isokinetic_exercise,
     isotonic_exercise,
     moment_exercise,
     numbered_exercise,
 )
-from pma_gym.tasks.follow import infeasibility_reason
-from pma_gym.tasks.isotonic import ISOTONIC, isotonic, pressure_triangle
-from pma_gym.tasks.limits import LIMITS, broken, broken_limit, limit_in_words, unsafe
+from pma_gym.tasks.isotonic import ISOTONIC, infeasibility_reason, isotonic, pressure_triangle
 from pma_gym.tasks.operator import (
     OPERATOR_BOUNDS,
     PACED,
@@ -32,17 +33,27 @@ from pma_gym.tasks.randomisation import (
     station_within_intervals,
     varied_station,
 )
-from pma_gym.tasks.rewards import (
+from pma_gym.tasks.task import (
     GAUSSIAN_END,
+    LIMITS,
     REWARDS,
+    TASKS,
+    TRIAL_TAIL_S,
+    Actuator,
     Reward,
+    Task,
     absolute_reward,
+    broken,
+    broken_limit,
     gaussian_reward,
+    limit_in_words,
     missed_reward,
+    phase_errors,
+    phase_rmse,
     quadratic_reward,
     smooth_reward,
+    unsafe,
 )
-from pma_gym.tasks.task import TASKS, TRIAL_TAIL_S, Actuator, Task, phase_errors, phase_rmse
 from pma_gym.tasks.unseen import UNSEEN, following, multisine, sine, speeds, steps, unseen
 
 EVERY_TASK: dict[str, Task] = {**TASKS, **UNSEEN, **ISOTONIC, **EXERCISES}

@@ -1,4 +1,9 @@
-"""Tasks: a schedule, the actuator that moves, the pressures, and the scores."""
+"""Tasks: a schedule, the actuator that moves, the pressures, and the scores.
+
+Physical limits of the rig, and safety limits of an exercise.
+
+Rewards of a step, by name.
+"""
 
 import math
 from dataclasses import dataclass
@@ -11,7 +16,14 @@ from pma_gym.data.trial_schedule import DISPLACEMENT, ROTATION, TrialSchedule
 from pma_gym.metrics import PHASE_DURATION, PHASE_SAMPLES, SAMPLE_RATE_HZ, rmse
 
 if TYPE_CHECKING:
-    from pma_gym.tasks.exercise import Exercise
+    from pma_gym.tasks.exercises import Exercise
+from collections.abc import Callable, Mapping
+
+from pma_gym.codegen.generic import where
+from pma_gym.effects.arithmetic import exponential
+from pma_gym.plant.model import Model
+from pma_gym.tasks.exercises import Exercise
+from pma_gym.units import SI_FACTORS
 
 TRIAL_TAIL_S = (PHASE_SAMPLES - 1) / SAMPLE_RATE_HZ - PHASE_DURATION
 """How far past its 5 s the last phase is recorded (s): its last sample is at 1922 / 384 s."""
@@ -188,3 +200,118 @@ def phase_rmse(schedule: TrialSchedule, position: NDArray[np.float64]) -> dict[s
     begun = {name: e for name, e in phase_errors(schedule, position).items() if len(e)}
     known = {name: rmse(error) for name, error in begun.items()}
     return known | {"all": rmse(np.concatenate(list(begun.values())))}
+
+
+LIMITS: tuple[tuple[str, str, float], ...] = (
+    ("contraction", "contraction", 1.0),
+    ("contraction", "stretch", -1.0),
+    ("load", "tension", 1.0),
+    ("pressure", "pressure", 1.0),
+)
+"""Physical limits of the rig: output, the field of `[limits]` that bounds it, and its sign."""
+
+
+def broken(limits: Any, truth: Mapping[str, Any]) -> Any:  # noqa: ANN401
+    """Index (from 1) of the first of `LIMITS` that a state exceeds, else 0.0; numbers or traced.
+
+    Args:
+        limits: the rig's parameters of `[limits]` (SI).
+        truth: contraction (m), load (N), pressure (Pa).
+    """
+    code = 0.0
+    # A state that is no number keeps no limit. The first of several counts.
+    for i, (output, limit, sign) in reversed(list(enumerate(LIMITS, 1))):
+        code = where(sign * truth[output] <= getattr(limits, limit), code, float(i))
+    return code
+
+
+def unsafe(exercise: Exercise, moment: Any, speed: Any) -> Any:  # noqa: ANN401
+    """Code of the safety limit that an exercise exceeds, counted on from `LIMITS`; 0.0 for none.
+
+    Args:
+        exercise: with its safe moment and speed.
+        moment: at the joint (N m), a number or a traced value.
+        speed: of the joint (rad/s).
+    """
+    code = float(len(LIMITS))
+    # A joint that turns at no speed that is a number is not safe.
+    speed_code = where(abs(speed) <= exercise.safe_speed, 0.0, code + 2.0)
+    return where(moment <= exercise.safe_moment, speed_code, code + 1.0)
+
+
+def broken_limit(model: Model, truth: Mapping[str, float]) -> str:
+    """Name the physical limit of the rig that a state exceeds; "" if none.
+
+    Args:
+        model: the rig's model, with its limits.
+        truth: contraction (m), load (N), pressure (Pa).
+    """
+    return limit_in_words(model, broken(model.parameters["limits"], truth))
+
+
+def limit_in_words(model: Model, code: float, exercise: Exercise | None = None) -> str:
+    """Name the limit that `broken` or `unsafe` returned; "" for 0."""
+    if not code:
+        return ""
+    limits = model.parameters["limits"]
+    words = (
+        f"contraction above {limits.contraction * 1e3:g} mm",
+        f"muscle stretched over {limits.stretch * 1e3:g} mm beyond its resting length",
+        f"cable tension above {limits.tension:g} N",
+        f"pressure above {limits.pressure / 1e3:g} kPa",
+    )
+    if exercise:
+        speed = exercise.safe_speed / SI_FACTORS["deg"]
+        words += (
+            f"moment at the joint above the safe {exercise.safe_moment:g} N m",
+            f"joint faster than the safe {speed:g} deg/s",
+        )
+    return words[int(code) - 1]
+
+
+def absolute_reward(error_percent: Any, change: Any) -> Any:  # noqa: ANN401
+    """Minus the absolute error in percent of the range: -|e|."""
+    return -abs(error_percent)
+
+
+def quadratic_reward(error_percent: Any, change: Any) -> Any:  # noqa: ANN401
+    """Minus the squared error in percent of the range: -e^2."""
+    return -error_percent * error_percent
+
+
+def gaussian_reward(error_percent: Any, change: Any) -> Any:  # noqa: ANN401
+    """exp(-e^2) of the error in percent of the range, between 0 and 1; 0 beyond e^2 = 12."""
+    square = error_percent * error_percent
+    near = square < GAUSSIAN_END
+    return where(near, exponential(-where(near, square, 0.0)), 0.0)
+
+
+def smooth_reward(error_percent: Any, change: Any) -> Any:  # noqa: ANN401
+    """The absolute reward less a tenth of the action's change: -|e| - 0.1 |da|."""
+    return -abs(error_percent) - 0.1 * abs(change)
+
+
+GAUSSIAN_END = 12.0
+"""Squared error beyond which the gaussian reward is 0, where it would be 6e-6."""
+
+
+Reward = Callable[[Any, Any], Any]
+"""Reward of a step: of the true error at its end (percent of range), and of the largest change
+of an action (which runs from -1 to 1) since the step before. Written in the arithmetic of laws, so
+that kernels compute it too."""
+
+REWARDS: dict[str, Reward] = {
+    "absolute": absolute_reward,
+    "quadratic": quadratic_reward,
+    "gaussian": gaussian_reward,
+    "smooth": smooth_reward,
+}
+"""Rewards by name."""
+
+
+def missed_reward(reward: Reward) -> float:
+    """Reward of each step that a terminated episode did not reach: an error of the whole range.
+
+    Following badly to the end is worth more, so that breaking the rig never pays.
+    """
+    return reward(100.0, 0.0)

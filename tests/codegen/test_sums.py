@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pma_gym.codegen.graph import CHANGING, Graph
-from pma_gym.codegen.sums import Sums
+from pma_gym.codegen.machine.simd import Sums
 from pma_gym.codegen.trace import order
 
 

@@ -8,7 +8,7 @@ import pytest
 
 from controllers import ADRC
 from controllers.adrc import BOUNDS, DEFAULTS, Settings
-from controllers.controller import LinearController
+from controllers.registry import LinearController
 from pma_gym.tasks import ISOTONIC
 
 PERIOD = 0.01

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from controllers import ILC
-from controllers.ilc import BOUNDS, DEFAULTS, LearningGain, Settings
-from controllers.models.lifted_model import LiftedModel
+from controllers.ilc import BOUNDS, DEFAULTS, LearningGain, LiftedModel, Settings
 from controllers.models.nominal_motion import nominal_motion
 from pma_gym.envs import PMAEnv
 

@@ -6,12 +6,19 @@ from scipy.optimize import lsq_linear
 
 from controllers import FeedforwardPID, ImprovedFeedforward, Oracle
 from controllers.design.bounded_least_squares import Space, best_plan
-from controllers.design.horizon import HORIZON_S, LONGEST, block_lengths, horizon
-from controllers.models.prediction import PLANS, Commands, Prediction
+from controllers.oracle import (
+    HORIZON_S,
+    LONGEST,
+    PLANS,
+    Commands,
+    Prediction,
+    block_lengths,
+    horizon,
+)
 from pma_gym.envs import PMAEnv
 from pma_gym.metrics import SAMPLE_RATE_HZ
-from pma_gym.plant.condition import Condition
 from pma_gym.plant.plant import Plant
+from pma_gym.plant.statics import Condition
 
 LATE = {"control_rate_hz": 50.0, "action_delay_s": 0.02}
 DISTURBED = {"disturbances": "regulator_and_hand_push"}

@@ -10,13 +10,12 @@ import pytest
 
 pytest.importorskip("safetensors")
 
-from controllers.controller import Controller
-from controllers.policies.action_mapping import ActionMapping
-from controllers.policies.adapter import PolicyAdapter
+from controllers.policies.adapter import ActionMapping, PolicyAdapter
 from controllers.policies.network import Network
 from controllers.policies.observation_spec import ObservationSpec
 from controllers.policies.policy_file import PolicyError, save_policy_file
 from controllers.policy import Policy, ShippedPolicy, shipped_policies
+from controllers.registry import Controller
 from pma_gym.envs import PMAEnv
 from tests.controllers.drawn_policies import drawn_policy
 

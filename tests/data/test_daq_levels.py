@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from pma_gym.data.calibration import DAQ_LIMIT, DAQ_STEP, LOAD_CELL, LVDT, quantise
-from pma_gym.data.quality.clipping import ends
-from pma_gym.data.quality.daq_levels import at_daq_end, read_by_daq
+from pma_gym.data.quality.clipping import at_daq_end, ends, read_by_daq
 from pma_gym.data.signals import SIGNALS
 from pma_gym.data.trial import Trial
 

@@ -15,10 +15,10 @@ from pma_gym.effects import CATALOGUE
 from pma_gym.effects.arithmetic import exponential
 from pma_gym.effects.effect import signals
 from pma_gym.effects.ports import measured_output
-from pma_gym.plant.condition import Condition
 from pma_gym.plant.model import Model, load_model, shipped_models
 from pma_gym.plant.plant import Plant
 from pma_gym.plant.rigs import RIGS
+from pma_gym.plant.statics import Condition
 
 SIGNALS = {
     "pressure": (0.0, 600e3),

@@ -5,9 +5,9 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from pma_gym.effects.muscle.stiffness import spring_stiffness
-from pma_gym.plant.condition import Condition
 from pma_gym.plant.model import load_model
 from pma_gym.plant.plant import Plant
+from pma_gym.plant.statics import Condition
 
 FRICTIONLESS = {
     "damping.contracting_n_s_per_mm": 0.0,

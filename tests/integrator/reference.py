@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from pma_gym.plant.condition import Condition
 from pma_gym.plant.plant import Plant
 from pma_gym.plant.simulation import Run, simulate_all
+from pma_gym.plant.statics import Condition
 
 CONTROL_PERIOD = 0.01
 """Time from one command to the next (s)."""

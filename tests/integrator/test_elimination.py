@@ -4,7 +4,7 @@ import numpy as np
 
 from pma_gym.codegen.graph import CHANGING, Graph
 from pma_gym.codegen.text import evaluate
-from pma_gym.integrator.elimination import solver
+from pma_gym.integrator.exponential_rosenbrock import solver
 
 
 def test_elimination_solves_what_numpy_solves():

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from pma_gym.plant.condition import Condition
 from pma_gym.plant.model import load_model
 from pma_gym.plant.plant import Plant
+from pma_gym.plant.statics import Condition
 
 FINE = 1e-5
 """Time between rows (s), for impulses."""

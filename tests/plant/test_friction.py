@@ -10,11 +10,11 @@ from hypothesis import strategies as st
 from pma_gym.codegen.text import python_text
 from pma_gym.codegen.trace import live_inputs
 from pma_gym.effects.slide.coulomb_friction import friction_force, friction_path
-from pma_gym.plant.condition import Condition
 from pma_gym.plant.model import load_model
 from pma_gym.plant.plant import Plant
 from pma_gym.plant.program import parameter_names
 from pma_gym.plant.simulation import Run, simulate_all
+from pma_gym.plant.statics import Condition
 
 STATIC, DYNAMIC, PRESLIDING = 1.96, 1.47, 10e-6
 P = load_model("serres2008").parameters["coulomb_friction"]

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from pma_gym.effects.muscle.geometric_force import SchulteForce, schulte_force
-from pma_gym.plant.exercise_device.parallel_muscles import (
+from pma_gym.plant.exercise_device.device import (
     TESTED,
     Muscles,
     MusclesError,

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from pma_gym.integrator.step_attempt import first_size
-from pma_gym.plant.condition import Condition
 from pma_gym.plant.forms.plain import PlainPlant
 from pma_gym.plant.plant import Plant
 from pma_gym.plant.program import FIRST_S
+from pma_gym.plant.statics import Condition
 from tests.integrator.reference import demanding_commands
 
 MODELS = ("serres2008", "station", "cascade")

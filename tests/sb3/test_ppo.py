@@ -13,7 +13,7 @@ from stable_baselines3.common.torch_layers import FlattenExtractor
 from torch import nn
 
 import pma_gym.sb3.ppo as sb3_ppo
-import pma_gym.sb3.threads as sb3_threads
+import pma_gym.sb3.ppo as sb3_threads
 from pma_gym.sb3.network import derivatives
 from pma_gym.sb3.policy import LeanMlpPolicy
 from pma_gym.sb3.ppo import LeanPPO

@@ -8,8 +8,8 @@ pytest.importorskip("torch")
 
 import torch
 
-import pma_gym.sb3.threads as sb3_threads
-from pma_gym.sb3.threads import FIRST, PAUSES_S, ThreadTuner, threads
+import pma_gym.sb3.ppo as sb3_threads
+from pma_gym.sb3.ppo import FIRST, PAUSES_S, ThreadTuner, threads
 
 
 class Clock:

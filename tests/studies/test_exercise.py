@@ -4,16 +4,20 @@ import numpy as np
 import pytest
 
 from pma_gym.data.serres2008 import load_table
-from pma_gym.plant.exercise_device.device import FULL_ANGLE, Device, own_device, resistive_moment
+from pma_gym.plant.exercise_device.device import (
+    FULL_ANGLE,
+    Device,
+    muscles,
+    own_device,
+    resistive_moment,
+)
 from pma_gym.plant.exercise_device.knee import dissertations_knee_peak, knee_extension_torque
-from pma_gym.plant.exercise_device.parallel_muscles import muscles
 from pma_gym.plant.exercise_device.prescription import UnreachableError, follow, hold, smallest
 from pma_gym.plant.memory_start import begun_at
 from pma_gym.plant.model import load_model
 from pma_gym.plant.plant import Plant
 from pma_gym.plant.statics import muscle_force
-from pma_gym.studies.makers_figures import makers_figures
-from pma_gym.studies.moment_ranges import check_moments, lowest_rest_pressure, span
+from pma_gym.studies.moment_ranges import check_moments, lowest_rest_pressure, makers_figures, span
 
 PRESSURES = np.linspace(275e3, 575e3, 13)
 ANGLES = np.radians(np.linspace(0.0, 90.0, 7))

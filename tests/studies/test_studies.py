@@ -4,8 +4,12 @@ import pytest
 from pma_gym.data.serres2008 import corrections, load_table
 from pma_gym.metrics import rmse_from_regression
 from pma_gym.studies import compare_all
-from pma_gym.studies.contraction import spring_lines, time_constants
-from pma_gym.studies.line_analysis import contractile_force_line, rounding_of_table_i2
+from pma_gym.studies.contraction import (
+    contractile_force_line,
+    rounding_of_table_i2,
+    spring_lines,
+    time_constants,
+)
 from pma_gym.studies.recursion import table_19_recursion
 from pma_gym.studies.station_limits import position_voltage_fit, three_element_errors
 from pma_gym.studies.trials import TRIALS, measured_regression

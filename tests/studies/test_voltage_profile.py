@@ -4,12 +4,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pma_gym.data.serres2008 import load_table, pressures
-from pma_gym.studies.position_voltage import used_quadratics, voltage_from_input
 from pma_gym.studies.recursion import PROFILES, agreeing_rows
 from pma_gym.studies.voltage_profile import (
     feedforward,
     profile_model,
     reachable_mm,
+    used_quadratics,
+    voltage_from_input,
     voltage_profile,
 )
 

@@ -4,8 +4,8 @@ from collections.abc import Iterable, Mapping
 from datetime import date
 from pathlib import Path
 
-from benchmarks.runner.environment_info import git_state
 from benchmarks.runner.fingerprint import ROOT, digest_of
+from benchmarks.runner.provenance import git_state
 
 Measured = Mapping[str, str]
 """`commit`, `date` and `method`, the digest of the sources of `pma_gym/discovery`."""

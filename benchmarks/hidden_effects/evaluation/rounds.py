@@ -3,19 +3,98 @@
 A round carries the experiment out on the case's rig, with new noise of the same kind, adds the
 trial to the data set and asks again. It ends when an effect is named, rightly or not, or when
 the diagnosis no longer asks for an experiment.
+
+One case from the draw to the answer, in any process.
+
+Asking for a diagnosis of a case: files are written, and read back as a user's would be.
 """
 
 import time
-from dataclasses import replace
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from benchmarks.hidden_effects.evaluation.diagnosis import Answer, Judge, asked
+from benchmarks.hidden_effects.evaluation import records
 from benchmarks.hidden_effects.evaluation.verdicts import compare, judged
+from benchmarks.hidden_effects.generation.blocks import Block
 from benchmarks.hidden_effects.generation.cases import Case, measure
-from benchmarks.hidden_effects.generation.files import Volts, random_experiment
+from benchmarks.hidden_effects.generation.files import (
+    Volts,
+    case_name,
+    random_experiment,
+    write_case,
+)
+from benchmarks.hidden_effects.physics.rig import Array
 from benchmarks.hidden_effects.physics.simulation import RATE
+from pma_gym.partials import begin_temporary_folder, end_partial
+
+
+@dataclass(frozen=True)
+class Answer:
+    """Answer of a diagnosis.
+
+    Attributes:
+        document: its `diagnosis.json`; None where it gave none.
+        message: what it raised instead.
+        following: motor and regulator voltages of the experiment that it proposes, shape (rows,)
+            each; None without a proposal.
+    """
+
+    document: dict[str, Any] | None
+    message: str = ""
+    following: tuple[Array, Array] | None = None
+
+
+Judge = Callable[[Path], Answer]
+"""What `diagnosed` is: takes the folder of a data set."""
+
+
+def unproposed(folder: Path) -> Answer:
+    """As `diagnosed`, without the seconds that a proposal takes."""
+    return diagnosed(folder, propose=False)
+
+
+def diagnosed(folder: Path, propose: bool = True) -> Answer:
+    """The answer of `pma-gym diagnose` with its defaults, without the start of a process."""
+    # Here, for other judges need none of it.
+    from pma_gym.data.datasets.dataset import read_dataset
+    from pma_gym.discovery import diagnose
+
+    diagnosis = diagnose(read_dataset(folder), jobs=1, propose=propose)
+    proposal, following = diagnosis.next_experiment, None
+    if proposal is not None:
+        commands = proposal.trial.commands
+        motor, regulator = (
+            np.round(commands[name], 3) for name in ("motor_voltage", "regulator_voltage")
+        )
+        following = motor, regulator
+    return Answer(diagnosis.document(), following=following)
+
+
+def asked(case: Case, number: int, judge: Judge, keep: Path | None = None) -> Answer:
+    """A judge's answer to a case; what it raises becomes the answer's message.
+
+    Args:
+        case: the case, of whose truth the judge sees nothing.
+        number: of the case.
+        judge: makes the answer.
+        keep: folder in which the files stay; none do if not given.
+    """
+    place = begin_temporary_folder("hidden_effects") if keep is None else keep
+    try:
+        write_case(case, place, number)
+        return judge(place / "cases" / case_name(number))
+    except Exception as error:
+        return Answer(None, f"{type(error).__name__}: {error}")
+    finally:
+        if keep is None:
+            with suppress(OSError):
+                end_partial(place)
+
 
 CHOOSERS = ("proposed", "random")
 """Who chooses the experiment. The random one's length is that of the first proposal."""
@@ -82,3 +161,54 @@ def _round(case: Case, answer: Answer, words: str) -> Round:
         said = compare(case.truth, answer.document).said
     hidden = [effect["name"] for effect in case.truth["effects"]]
     return {"excitation": words, "said": said, **judged(said, hidden)}
+
+
+@dataclass(frozen=True)
+class Work:
+    """A case to draw and to diagnose; its result is a record.
+
+    Attributes:
+        block: its block.
+        seed: of the set.
+        number: of the case, 1 and up.
+        folder: of the set.
+        keep: keep the trials too, in `folder/data`.
+        code: fingerprint of the code, for the record.
+        judge: makes the answer; what it raises becomes the record's message.
+    """
+
+    block: Block
+    seed: int
+    number: int
+    folder: Path
+    keep: bool = False
+    code: str = ""
+    judge: Judge = diagnosed
+
+    def __call__(self) -> records.CaseRecord:
+        """Do it."""
+        begun = time.perf_counter()
+        case = self.block.draw(self.seed, self.number)
+        drawn = time.perf_counter()
+        kept = self.folder / "data" if self.keep else None
+        # Where no experiment follows, none need be proposed.
+        idle = self.judge is diagnosed and not self.block.rounds
+        answer = asked(case, self.number, unproposed if idle else self.judge, kept)
+        answered = time.perf_counter()
+        rounds = {}
+        if self.block.rounds:
+            # Here, for it compiles the package's library of experiments.
+
+            rounds = follow(case, answer, self.block.rounds, self.judge)
+        ends = {"draw": drawn - begun, "diagnose": answered - drawn}
+        ends["rounds"] = time.perf_counter() - answered
+        return records.CaseRecord(
+            self.number,
+            case.truth,
+            answer.document and records.essentials(answer.document),
+            answer.message,
+            rounds,
+            {name: round(took, 3) for name, took in ends.items()},
+            self.code,
+            self.block.rounds,
+        )

@@ -6,8 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from benchmarks.hidden_effects.rigs.imposed_rig import ImposedRig
-from benchmarks.hidden_effects.rigs.rig import Rig
+from benchmarks.hidden_effects.rigs.rig import ImposedRig, Rig
 
 
 @dataclass(frozen=True)

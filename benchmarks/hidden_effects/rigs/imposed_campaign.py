@@ -9,9 +9,8 @@ from scipy.ndimage import gaussian_filter1d
 
 from benchmarks.hidden_effects.rigs import files
 from benchmarks.hidden_effects.rigs.excitation import Reference, draw_lengths, draw_reference
-from benchmarks.hidden_effects.rigs.imposed_rig import ImposedRig, draw_imposed
 from benchmarks.hidden_effects.rigs.laws import Backlash, HiddenEffect
-from benchmarks.hidden_effects.rigs.rig import log_uniform
+from benchmarks.hidden_effects.rigs.rig import ImposedRig, draw_imposed, log_uniform
 from benchmarks.hidden_effects.rigs.sensing import Sensor, draw_noise
 from benchmarks.hidden_effects.rigs.simulators import imposed_force, mujoco_force
 

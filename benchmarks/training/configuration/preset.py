@@ -20,8 +20,7 @@ from benchmarks.training.configuration.settings import (
     whole,
 )
 from benchmarks.training.stations import training_recipe
-from controllers.policies.action_mapping import ActionMapping
-from controllers.policies.adapter import base_of
+from controllers.policies.adapter import ActionMapping, base_of
 from controllers.policies.observation_spec import ObservationSpec
 from pma_gym.documents import is_file, read_yaml
 from pma_gym.engine.options import parse_options, parse_task

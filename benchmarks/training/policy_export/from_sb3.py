@@ -7,7 +7,7 @@ import numpy as np
 from gymnasium import spaces
 
 from benchmarks.training.policy_export.agreement import ExportError, check_agreement
-from controllers.policies.action_mapping import ActionMapping
+from controllers.policies.adapter import ActionMapping
 from controllers.policies.network import Layer, Scaling, Weights
 from controllers.policies.observation_spec import ObservationSpec
 from controllers.policies.policy_file import PolicyFile

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from benchmarks.runner.environment_info import ROOT, git_state
+from benchmarks.runner.provenance import ROOT, git_state
 from benchmarks.training.configuration.preset import Preset
 from benchmarks.training.environments import pressures_kpa
 from benchmarks.training.policy_export.from_sb3 import policy_from_sb3

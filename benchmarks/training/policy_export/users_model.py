@@ -12,7 +12,7 @@ import gymnasium as gym
 from benchmarks.training.policy_export.from_sb3 import ExportError, policy_from_sb3
 from benchmarks.training.policy_export.onnx_file import onnx_bytes
 from controllers.design.designs import task_kind
-from controllers.policies.action_mapping import MIDDLE_V, ActionMapping
+from controllers.policies.adapter import MIDDLE_V, ActionMapping
 from controllers.policies.observation_spec import ObservationSpec
 from controllers.policies.policy_file import PolicyFile, policy_pair, save_policy_file
 from pma_gym.documents import parse_json

@@ -17,7 +17,7 @@ from pma_gym.data.quality.outliers import outliers
 from pma_gym.data.readers.table import FileFormat, Table
 from pma_gym.data.trial import Trial
 from pma_gym.data.trial_columns import BY_QUANTITY, ColumnMap, TrialError
-from pma_gym.paths import as_path
+from pma_gym.files import as_path
 from pma_gym.units import SI_FACTORS
 
 __all__ = ["PROPOSED", "Dataset", "NamedTrial", "read_dataset"]

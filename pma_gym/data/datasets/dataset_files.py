@@ -1,14 +1,24 @@
-"""The files of a data set's folder: those that are read, and messages on the others."""
+"""The files of a data set's folder: those that are read, and messages on the others.
 
+Files with the same content: a copy is no second measurement.
+
+Copies make noise look repeatable and intervals too narrow. Contents are compared, not names: time
+since the first row, commands and readings.
+"""
+
+import hashlib
 import re
 from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
+
 from pma_gym.data.datasets.dataset_toml import Description
 from pma_gym.data.files.trial_formats import DECODERS
 from pma_gym.data.files.trial_loading import load_tables
 from pma_gym.data.readers.table import PART, Table, UnreadableError
+from pma_gym.data.trial import Trial
 from pma_gym.data.trial_columns import TrialError, suggestion
 
 PROPOSED = "next.csv"
@@ -156,3 +166,37 @@ def _instead(folder: Path) -> str:
     others = sorted({path.suffix or path.name for path in folder.iterdir() if path.is_file()})
     has = f"its files end in {', '.join(others)}" if others else "it is empty"
     return f"no {kinds} file lies in it ({has}); save each trial as a CSV file with a header"
+
+
+DIGITS = 9
+"""Significant digits that are compared: a copy through a spreadsheet may lose the last ones."""
+
+
+def copies(trials: Sequence[Trial]) -> dict[int, int]:
+    """Find trials that repeat the content of an earlier one.
+
+    Args:
+        trials: the trials.
+    Returns:
+        Index of the earlier one by the index of the copy.
+    """
+    seen: dict[str, int] = {}
+    originals = {}
+    for number, trial in enumerate(trials):
+        first = seen.setdefault(_content(trial), number)
+        if first != number:
+            originals[number] = first
+    return originals
+
+
+def _content(trial: Trial) -> str:
+    """A digest of time, commands and readings."""
+    digest = hashlib.sha256()
+    columns = {"time": trial.time - trial.time[0], **trial.commands, **trial.measurements}
+    for name in sorted(columns):
+        values = columns[name]
+        scale = float(np.nanmax(np.abs(values), initial=0.0)) or 1.0
+        # Plus 0: a negative zero has other bytes.
+        whole = np.rint(values / scale * 10.0**DIGITS) + 0.0
+        digest.update(name.encode() + np.nan_to_num(whole, nan=-1e300).tobytes())
+    return digest.hexdigest()

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pma_gym.data.files.trial_hints import FACTORS, looks_like
-from pma_gym.data.readers.units import unit_of
+from pma_gym.data.readers.layout import unit_of
 from pma_gym.data.signals import SIGNALS
 from pma_gym.data.trial_columns import BY_NAME, RAW_COLUMNS, Column
 

@@ -33,8 +33,7 @@ from pma_gym.data.trial_columns import (
     sources,
     suggestion,
 )
-from pma_gym.files import OutputError, check_output, replace_file
-from pma_gym.paths import as_path
+from pma_gym.files import OutputError, as_path, check_output, replace_file
 
 __all__ = [
     "USUAL_S",

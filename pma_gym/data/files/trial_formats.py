@@ -2,23 +2,45 @@
 
 CSV is the format of a log and holds nothing but columns. Parquet keeps the provenance in its schema
 metadata, XLSX on a second sheet.
+
+Libraries of the `files` extra, which only some formats need.
 """
 
 import csv
+import importlib
 import io
 import json
 import re
 from collections.abc import Callable, Mapping
+from types import ModuleType
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pma_gym.data.readers.delimited import read_text
-from pma_gym.data.readers.libraries import needed
 from pma_gym.data.readers.reader_process import binary_reader
-from pma_gym.data.readers.table import PROVENANCE, Request, Table
+from pma_gym.data.readers.table import PROVENANCE, Request, Table, UnreadableError
 
-__all__ = ["DECODERS", "ENCODERS", "PROVENANCE", "Columns", "Reader", "Table"]
+__all__ = ["Columns", "DECODERS", "ENCODERS", "PROVENANCE", "Reader", "Table"]
+
+_PACKAGES = {"nptdms": "npTDMS"}
+
+
+def needed(module: str, file: str) -> ModuleType:
+    """A library of the `files` extra.
+
+    Raises:
+        UnreadableError: it is not installed.
+    """
+    try:
+        return importlib.import_module(module)
+    except ImportError:
+        name = module.partition(".")[0]
+        raise UnreadableError(
+            f"{_PACKAGES.get(name, name)}, which {file} needs, is not installed: "
+            'pip install "pma-gym[files]"'
+        ) from None
+
 
 Columns = Mapping[str, NDArray[np.float64]]
 """Values in files' units by column name; NaN = empty."""

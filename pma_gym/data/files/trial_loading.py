@@ -19,8 +19,8 @@ from pma_gym.data.readers.table import (
     UnreadableError,
 )
 from pma_gym.data.trial_columns import ColumnMap, TrialError, suggestion
+from pma_gym.files import as_path
 from pma_gym.limits import LimitError, check_limit
-from pma_gym.paths import as_path
 
 _NEEDED = "a trial needs a header with time_s and a command, and a row for each sample"
 _SHOWN = 5

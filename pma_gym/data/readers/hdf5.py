@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from pma_gym.data.readers.libraries import needed
+from pma_gym.data.files.trial_formats import needed
 from pma_gym.data.readers.table import Request, Table
 from pma_gym.data.readers.variables import (
     NUMBERS,

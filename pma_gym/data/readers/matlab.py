@@ -4,8 +4,8 @@ import io
 
 import numpy as np
 
+from pma_gym.data.files.trial_formats import needed
 from pma_gym.data.readers import hdf5
-from pma_gym.data.readers.libraries import needed
 from pma_gym.data.readers.table import Request, Table
 from pma_gym.data.readers.variables import OPAQUE, Unread, Variable, array_of, tables_of
 from pma_gym.limits import check_limit

@@ -13,8 +13,8 @@ from dataclasses import replace
 from functools import cache
 from typing import Any
 
+from pma_gym.data.files.trial_formats import needed
 from pma_gym.data.readers.layout import Row, arrange
-from pma_gym.data.readers.libraries import needed
 from pma_gym.data.readers.table import (
     PART,
     PROVENANCE,

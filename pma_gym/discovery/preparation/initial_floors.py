@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from pma_gym.data.datasets.dataset import NamedTrial
 from pma_gym.data.datasets.lab_sensors import LabSensor
-from pma_gym.data.quality.daq_levels import read_by_daq
+from pma_gym.data.quality.clipping import read_by_daq
 from pma_gym.data.signals import Signal
 from pma_gym.discovery.preparation.acceptance_floors import difference
 from pma_gym.discovery.preparation.noise import (

@@ -3,7 +3,6 @@
 from llvmlite import ir
 
 from pma_gym.codegen.machine import arrays
-from pma_gym.codegen.machine.builtin import INTERFACE
 from pma_gym.codegen.machine.control import (
     DOUBLE,
     FLOAT,
@@ -17,6 +16,7 @@ from pma_gym.codegen.machine.control import (
     loop,
     offset,
 )
+from pma_gym.codegen.machine.native import INTERFACE
 from pma_gym.engine.cpu.block_memory import ARGUMENTS
 from pma_gym.engine.state_layout import StateLayout
 

@@ -11,15 +11,17 @@ from pma_gym.engine.engine_memory import EngineMemory
 from pma_gym.engine.nominal_rig import motor_at_rest, nominal_model, rig_model
 from pma_gym.engine.option_checks import Pressure
 from pma_gym.engine.options import Options
-from pma_gym.engine.reset.operators import check_prescription, operators, wound_back
 from pma_gym.engine.reset.reset_state import (
     Settled,
+    check_prescription,
     drawn_events,
     drawn_pressures,
     hangs_slack,
     holding_voltages,
+    operators,
     settled_at_no_load,
     settled_under_load,
+    wound_back,
 )
 from pma_gym.engine.state_layout import START
 from pma_gym.plant.compiled_model import regulator_voltage

@@ -6,11 +6,11 @@ from pma_gym.data.signals import SIGNALS
 from pma_gym.effects.effect import Effect
 from pma_gym.effects.ports import SENSOR_DELAY, measured_output
 from pma_gym.plant.compiled_model import CompiledModel
-from pma_gym.plant.condition import Condition, check_commands
 from pma_gym.plant.equilibrium.force_balance import balances
 from pma_gym.plant.equilibrium.problem import EquilibriumProblem, effect_parameters, put_memories
 from pma_gym.plant.model import Model
 from pma_gym.plant.rigs.rig import Rig
+from pma_gym.plant.statics import Condition, check_commands
 
 
 def start_sensors(problem: EquilibriumProblem, rig: Rig) -> None:

@@ -6,9 +6,9 @@ import numpy as np
 
 from pma_gym.data.signals import is_pressure
 from pma_gym.plant.compiled_model import CompiledModel
-from pma_gym.plant.condition import Condition
 from pma_gym.plant.equilibrium.force_balance import static_force
 from pma_gym.plant.equilibrium.solver import equilibrium_at
+from pma_gym.plant.statics import Condition
 
 if TYPE_CHECKING:
     import control

@@ -20,9 +20,9 @@ from pma_gym.codegen.graph import Value
 from pma_gym.codegen.text import python_text
 from pma_gym.codegen.trace import live_inputs
 from pma_gym.integrator.equations import COMMANDS, ZERO
-from pma_gym.plant.condition import Condition
 from pma_gym.plant.plant import Plant
 from pma_gym.plant.program import parameter_names
+from pma_gym.plant.statics import Condition
 
 
 @dataclass(frozen=True)

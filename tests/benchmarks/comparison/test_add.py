@@ -8,7 +8,7 @@ from rich.console import Console
 from typer.testing import CliRunner
 
 from benchmarks.__main__ import app
-from benchmarks.comparison.scores import print_clipping
+from benchmarks.comparison.add import print_clipping
 from benchmarks.runner.case import Case, run_case
 from benchmarks.runner.controller_spec import ControllerError, ControllerSpec
 from benchmarks.runner.journal import Journal

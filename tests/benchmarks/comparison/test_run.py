@@ -16,9 +16,9 @@ from rich.console import Console
 from typer.testing import CliRunner
 
 from benchmarks.__main__ import app
+from benchmarks.comparison.add import SCORES, TIMES
 from benchmarks.comparison.compare import compare
 from benchmarks.comparison.job import chosen, run_comparison
-from benchmarks.comparison.scores import SCORES, TIMES
 from benchmarks.executors.choice import ExecutorName, executor_named
 from benchmarks.executors.executor import ThisProcess
 from benchmarks.executors.failures import ProcessDied

@@ -11,8 +11,13 @@ from benchmarks.__main__ import app
 from benchmarks.exercise.choice import SEARCHED, Choice
 from benchmarks.exercise.choose_device import run_exercise
 from benchmarks.exercise.profile import ProfileError, held, read_profile
-from pma_gym.plant.exercise_device.device import FULL_ANGLE, Device, own_device, resistive_moment
-from pma_gym.plant.exercise_device.parallel_muscles import muscles
+from pma_gym.plant.exercise_device.device import (
+    FULL_ANGLE,
+    Device,
+    muscles,
+    own_device,
+    resistive_moment,
+)
 from pma_gym.plant.exercise_device.prescription import UnreachableError
 from pma_gym.plant.model import load_model
 

@@ -1,6 +1,6 @@
 """A diagnosis that takes no time, in a module that another process reads quickly."""
 
-from benchmarks.hidden_effects.evaluation.diagnosis import Answer
+from benchmarks.hidden_effects.evaluation.rounds import Answer
 
 
 def document(verdict="agrees", *effects):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from benchmarks.hidden_effects import physics
-from benchmarks.hidden_effects.evaluation import diagnosed_cases, scoring
+from benchmarks.hidden_effects.evaluation import records, scoring
 from benchmarks.hidden_effects.evaluation.verdicts import judged
 from benchmarks.hidden_effects.generation import drawing, files
 from benchmarks.hidden_effects.generation.blocks import BLOCKS as DRAWN
@@ -322,7 +322,7 @@ document = json.loads(sys.argv[-1])
 def test_answers_are_counted(drawn):
     folder, _ = drawn
     said = json.dumps(answer("effect", "cable_slack"))
-    diagnosed_cases.judge(folder, 2, ["--document", said], command=(sys.executable, "-c", STUB))
+    records.judge(folder, 2, ["--document", said], command=(sys.executable, "-c", STUB))
     text = scoring.score(folder)
     document = json.loads((folder / "score.json").read_text("utf-8"))
     single = document["blocks"]["single"]["rates"]

@@ -12,9 +12,8 @@ from benchmarks.__main__ import app
 from benchmarks.executors.choice import local
 from benchmarks.hidden_effects import run_blocks
 from benchmarks.hidden_effects.evaluation import scoring
-from benchmarks.hidden_effects.evaluation.diagnosis import Answer
 from benchmarks.hidden_effects.evaluation.measured import measured_text, method_digest
-from benchmarks.hidden_effects.evaluation.rounds import follow, with_trial
+from benchmarks.hidden_effects.evaluation.rounds import Answer, follow, with_trial
 from benchmarks.hidden_effects.evaluation.targets import RATES
 from benchmarks.hidden_effects.evaluation.verdicts import compare, unanswered
 from benchmarks.hidden_effects.generation.blocks import Block

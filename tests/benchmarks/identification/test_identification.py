@@ -8,10 +8,10 @@ import sys
 import numpy as np
 import pytest
 
-from benchmarks.identification import measurements, statics, transients
+from benchmarks.identification import statics, transients
 from benchmarks.identification.creep import STUDENT_10
 from benchmarks.identification.identify import borne, borne_unit
-from benchmarks.identification.measurements import station_limits
+from benchmarks.identification.statics import station_limits
 from benchmarks.identification.station import fitted_parameters, identify, leave_out
 from pma_gym.plant.model import load_model
 from pma_gym.plant.plant import Plant
@@ -51,7 +51,7 @@ def test_formulas_of_i3_equal_the_simulated_load_cycle(station, pressure, load):
     # Without the drive's offset of -2 N, which lets go of the cable before 15 s (0.16 mm).
     assert 1e3 * predicted.returned[0] == pytest.approx(returned, abs=0.1)
     parameters = station.parameters
-    pulley = measurements.Pulley(
+    pulley = statics.Pulley(
         parameters["rotor"].radius, parameters["cable"].stiffness, parameters["cable"].slack
     )
     angle = np.rad2deg(pulley.rotation(predicted.extension, np.array([load]))[0])
@@ -61,7 +61,7 @@ def test_formulas_of_i3_equal_the_simulated_load_cycle(station, pressure, load):
 
 
 def test_lines_through_i3(data):
-    drive, regulator = measurements.drive_line(data), measurements.regulator_line(data)
+    drive, regulator = statics.drive_line(data), statics.regulator_line(data)
     assert drive["drive.gain_n_per_v"] == pytest.approx(97.84, abs=0.005)
     assert drive["drive.offset_n"] == pytest.approx(-2.0, abs=0.005)
     # Table 1 prints 59.9 kPa/V and -20.4 kPa, read by the transducer before it was decoded.
@@ -70,7 +70,7 @@ def test_lines_through_i3(data):
 
 
 def test_pulley_finds_what_made_the_rotations(data):
-    truth = measurements.Pulley(radius=0.0254, stiffness=550e3, slack=0.9e-3)
+    truth = statics.Pulley(radius=0.0254, stiffness=550e3, slack=0.9e-3)
     made = data.__class__(
         **{
             **{name: getattr(data, name) for name in data.__dataclass_fields__},
@@ -78,12 +78,12 @@ def test_pulley_finds_what_made_the_rotations(data):
             "returned_rotation": truth.returned(data.returned, data.load),
         }
     )
-    assert measurements.fit_pulley(made) == pytest.approx(truth, rel=1e-9)
+    assert statics.fit_pulley(made) == pytest.approx(truth, rel=1e-9)
 
 
 _FITTED = """
 import json
-from benchmarks.identification.measurements import station_limits
+from benchmarks.identification.statics import station_limits
 from benchmarks.identification.station import fitted_parameters, identify
 from benchmarks.identification.transients import pressure_steps
 print(json.dumps(fitted_parameters(identify(station_limits(), pressure_steps()))))

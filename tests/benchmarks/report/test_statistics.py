@@ -5,7 +5,7 @@ from itertools import permutations
 import numpy as np
 import pytest
 
-from benchmarks.report.pairwise import Rank, improvement, ranking, ratio
+from benchmarks.report.standings import Rank, improvement, ranking, ratio
 from benchmarks.report.statistics import (
     interquartile_mean,
     interval,

@@ -16,7 +16,7 @@ from benchmarks.reproduction.reproduce import report_again, run_job, targets_aga
 from benchmarks.reproduction.results import CSV_COLUMNS, FIGURES, Results
 from benchmarks.reproduction.tables import columns
 from benchmarks.runner.controller_spec import ControllerSpec, parse_controllers
-from benchmarks.runner.environment_info import git_state
+from benchmarks.runner.provenance import git_state
 from benchmarks.suites.frozen import load_suite
 from benchmarks.suites.suite import SuiteError
 from pma_gym.pages.document import Heading, Paragraph, Picture, TextTable, to_html, to_markdown

@@ -10,7 +10,7 @@ import torch
 
 from benchmarks.training import environments
 from benchmarks.training.configuration.preset import Preset
-from controllers.policies.action_mapping import ActionMapping
+from controllers.policies.adapter import ActionMapping
 from controllers.policies.observation_spec import ObservationSpec
 
 SMALL = {

@@ -21,7 +21,7 @@ from benchmarks.training.run import Order, train
 from benchmarks.training.stations import Stations
 from benchmarks.training.train_policies import EXERCISE, ordered
 from benchmarks.training.validation import measure_of
-from controllers.policies.action_mapping import ActionMapping
+from controllers.policies.adapter import ActionMapping
 from controllers.policies.observation_spec import ObservationSpec
 from controllers.policies.policy_file import load_policy_file, save_policy_file
 from controllers.policy import Policy, shipped_policies

@@ -25,7 +25,7 @@ from benchmarks.training.policy_export.agreement import AGREEMENT, ExportError, 
 from benchmarks.training.policy_export.from_sb3 import weights_from_sb3
 from benchmarks.training.policy_export.onnx_file import onnx_bytes
 from benchmarks.training.policy_export.users_model import algorithm_of
-from controllers.policies.action_mapping import ActionMapping
+from controllers.policies.adapter import ActionMapping
 from controllers.policies.network import Network
 from controllers.policies.observation_spec import ObservationSpec
 from controllers.policies.policy_file import load_policy_file

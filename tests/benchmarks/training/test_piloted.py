@@ -9,7 +9,7 @@ import gymnasium as gym
 
 from benchmarks.training.policy_batch import PilotedVecEnv
 from benchmarks.training.policy_env import PilotedEnv
-from controllers.policies.action_mapping import ActionMapping
+from controllers.policies.adapter import ActionMapping
 from controllers.policies.observation_spec import ObservationSpec
 from pma_gym.plant.model import load_model
 

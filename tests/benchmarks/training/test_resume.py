@@ -146,7 +146,7 @@ PROCESS = """
 import hashlib, sys, pathlib
 from benchmarks.training import environments, run
 from benchmarks.training.configuration.preset import Preset
-from controllers.policies.action_mapping import ActionMapping
+from controllers.policies.adapter import ActionMapping
 from controllers.policies.observation_spec import ObservationSpec
 environments.VALIDATION = 1
 preset = Preset("small", "ppo", "pma_gym/IsokineticDisplacement-v0", ObservationSpec("tracking", 2,

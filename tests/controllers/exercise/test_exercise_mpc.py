@@ -4,8 +4,15 @@ import numpy as np
 import pytest
 
 from controllers import CONTROLLERS, ExerciseMPC
-from controllers.exercise.joint_prediction import Horizon, Joint, predicted
-from controllers.exercise.leg_observer import LegObserver, PressureObserver, ProcessNoise, leg_of
+from controllers.exercise.leg_observer import (
+    Horizon,
+    Joint,
+    LegObserver,
+    PressureObserver,
+    ProcessNoise,
+    leg_of,
+    predicted,
+)
 from controllers.exercise.resistance import AWAY_PA
 from pma_gym.envs import Measurement, PMAEnv
 

@@ -8,10 +8,15 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from controllers.models.lag_model import LagDeadTimeModel, lag_dead_time_model
 from controllers.models.local_model import LocalModel
 from controllers.models.nominal_motion import nominal_motion
-from controllers.observers.extended_state_observer import ExtendedStateObserver, place_of, placed
+from controllers.observers.extended_state_observer import (
+    ExtendedStateObserver,
+    LagDeadTimeModel,
+    lag_dead_time_model,
+    place_of,
+    placed,
+)
 from pma_gym.tasks import ISOTONIC
 
 PERIOD = 0.01

@@ -5,9 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from controllers.models.voltage import nominal_offset
-from controllers.policies.action_mapping import ActionMapping
-from controllers.policies.adapter import PolicyAdapter
+from controllers.models.operating_range import nominal_offset
+from controllers.policies.adapter import ActionMapping, PolicyAdapter
 from controllers.policies.observation_spec import ObservationSpec
 from pma_gym.envs import Measurement, PMAEnv, StationInfo
 from pma_gym.plant.model import load_model

@@ -14,7 +14,7 @@ pytest.importorskip("safetensors")
 
 from safetensors.numpy import load, save
 
-from controllers.policies.action_mapping import ActionMapping
+from controllers.policies.adapter import ActionMapping
 from controllers.policies.document import KEYS
 from controllers.policies.network import Network
 from controllers.policies.observation_spec import ObservationSpec

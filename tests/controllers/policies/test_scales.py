@@ -2,11 +2,9 @@
 
 import pytest
 
-from controllers.models.voltage import nominal_offset
-from controllers.policies.action_mapping import ActionMapping
-from controllers.policies.adapter import PolicyAdapter
-from controllers.policies.observation_spec import ObservationSpec
-from controllers.policies.scales import delayed_rows
+from controllers.models.operating_range import nominal_offset
+from controllers.policies.adapter import ActionMapping, PolicyAdapter
+from controllers.policies.observation_spec import ObservationSpec, delayed_rows
 from pma_gym.envs import Measurement, StationInfo
 from pma_gym.plant.model import load_model
 from pma_gym.tasks import TASKS, named_task

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from pma_gym.data.datasets.dataset import Dataset, NamedTrial
-from pma_gym.data.datasets.identical_trials import copies
+from pma_gym.data.datasets.dataset_files import copies
 from pma_gym.data.files.even_clock import even_clock
 from pma_gym.data.quality import gaps
 from pma_gym.data.trial import Trial

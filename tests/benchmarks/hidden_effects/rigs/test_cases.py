@@ -12,11 +12,11 @@ from benchmarks.hidden_effects.evaluation.verdicts import compare
 from benchmarks.hidden_effects.generation.files import write_case
 from benchmarks.hidden_effects.generation.undecidable import BLOCKS
 from benchmarks.hidden_effects.rigs import drawing, effect_size, files
+from benchmarks.hidden_effects.rigs.drawing import KNOWN, OFFERS, catalogue_name, group
 from benchmarks.hidden_effects.rigs.driven_campaign import draw_driven
 from benchmarks.hidden_effects.rigs.effect_size import expected
 from benchmarks.hidden_effects.rigs.files import GERMAN, METRES, OURS
 from benchmarks.hidden_effects.rigs.laws import ConstantForce, CoulombFriction, PressureFriction
-from benchmarks.hidden_effects.rigs.offers import KNOWN, OFFERS, catalogue_name, group
 from benchmarks.hidden_effects.rigs.rig import draw_joint, draw_slide
 from pma_gym.data.datasets.dataset import read_dataset
 from pma_gym.effects import CATALOGUE
