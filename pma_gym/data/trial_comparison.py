@@ -149,7 +149,6 @@ class TrialComparison:
 
         A notebook shows the figure; a script calls its `show()`, or `savefig("both.png")`.
         """
-
         titles = {name: f"RMSE {_value(name, size)}" for name, size in self.rmse.items()}
         return plot_series({name: series_of(each) for name, each in self.trials.items()}, titles)
 
