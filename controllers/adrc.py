@@ -6,7 +6,7 @@ import numpy as np
 
 from controllers.design.designs import designed
 from controllers.models.nominal_motion import NominalMotion
-from controllers.models.operating_range import nominal_offset
+from controllers.models.voltage import nominal_offset
 from controllers.observers.extended_state_observer import (
     ExtendedStateObserver,
     ObserverFeedback,

@@ -1,7 +1,7 @@
 """Open loop: the voltage that the inverse of the nominal model gives for the reference."""
 
 from controllers.models.nominal_motion import NominalMotion, nominal_motion
-from controllers.models.operating_range import VOLTAGE_LIMIT
+from controllers.models.voltage import VOLTAGE_LIMIT
 from controllers.registry import Reference
 from pma_gym.envs import Measurement, StationInfo
 

@@ -9,7 +9,8 @@ from controllers.design.designs import designed
 from controllers.design.quadratic_program import BoundedProgram
 from controllers.models.linear_motion import linear_motion
 from controllers.models.nominal_motion import nominal_motion
-from controllers.models.operating_range import VOLTAGE_LIMIT, ModelKey
+from controllers.models.operating_range import ModelKey
+from controllers.models.voltage import VOLTAGE_LIMIT
 from controllers.observers.filter_bank import BankDesign, DampingBank, bank_design
 from controllers.registry import Reference
 from pma_gym.envs import Measurement, StationInfo

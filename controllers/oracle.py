@@ -34,7 +34,7 @@ from numpy.typing import NDArray
 
 from controllers.design.bounded_least_squares import Errors, Space, best_plan
 from controllers.models.nominal_motion import nominal_motion
-from controllers.models.operating_range import VOLTAGE_LIMIT
+from controllers.models.voltage import VOLTAGE_LIMIT
 from controllers.registry import Reference
 from pma_gym.envs import Measurement, StationInfo
 from pma_gym.units import SI_FACTORS

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from controllers.design.designs import Gains, scheduled_gains
-from controllers.models.operating_range import VOLTAGE_LIMIT, nominal_offset
+from controllers.models.voltage import VOLTAGE_LIMIT, nominal_offset
 from controllers.registry import Reference
 from pma_gym.envs import Measurement, StationInfo
 

@@ -13,7 +13,7 @@ from benchmarks.files import write_text
 from pma_gym.document_shape import ListOf, Whole, check_shape, shape_of
 from pma_gym.documents import read_json
 from pma_gym.pages.document import TextTable, to_markdown
-from pma_gym.tasks.exercises import SAFE_MOMENT, SAFE_SPEED
+from pma_gym.tasks.exercise import SAFE_MOMENT, SAFE_SPEED
 from pma_gym.units import SI_FACTORS
 
 FIGURES = "safety.json"

@@ -10,7 +10,7 @@ from scipy.optimize import root_scalar
 
 from benchmarks.tuning.tuning_task import Job
 from controllers.design.designs import Gains
-from controllers.models.operating_range import nominal_offset
+from controllers.models.voltage import nominal_offset
 from controllers.pid import PID, linear_law
 from pma_gym.data.signals import SIGNALS
 from pma_gym.engine.nominal_rig import motor_at_rest

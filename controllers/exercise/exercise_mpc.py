@@ -19,7 +19,7 @@ from controllers.exercise.leg_observer import (
 from controllers.exercise.resistance import Resistance, exercise_of, pressures_of, volts_of
 from controllers.registry import Reference
 from pma_gym.envs import Measurement, StationInfo
-from pma_gym.tasks.exercises import PACE
+from pma_gym.tasks.exercise import PACE
 
 Array = NDArray[np.float64]
 

@@ -23,7 +23,7 @@ from typing import Protocol
 
 import numpy as np
 
-from controllers.models.operating_range import VOLTAGE_LIMIT
+from controllers.models.voltage import VOLTAGE_LIMIT
 from pma_gym.codegen.trace import as_numpy
 from pma_gym.effects.drive.position_map import mapped_displacement
 from pma_gym.envs import StationInfo

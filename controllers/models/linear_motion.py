@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from controllers.models.operating_range import VOLTAGE_LIMIT
+from controllers.models.voltage import VOLTAGE_LIMIT
 from pma_gym.data.signals import SIGNALS, is_pressure
 from pma_gym.engine.nominal_rig import motor_at_rest
 from pma_gym.envs import StationInfo

@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from scipy.linalg import expm
 
-from controllers.models.operating_range import VOLTAGE_LIMIT
+from controllers.models.voltage import VOLTAGE_LIMIT
 from pma_gym.data.signals import SIGNALS
 from pma_gym.plant.equilibrium.solver import equilibria_at
 from pma_gym.plant.forms.linear import linearize_at

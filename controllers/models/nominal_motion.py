@@ -10,13 +10,8 @@ import numpy as np
 from controllers.design.designs import must_give_a_position
 from controllers.models.inverse import Inverse, inverse_of
 from controllers.models.local_model import LocalModel, Stroke
-from controllers.models.operating_range import (
-    VOLTAGE_LIMIT,
-    ModelKey,
-    rest_voltages,
-    sensor_of,
-    stroke_along,
-)
+from controllers.models.operating_range import ModelKey, rest_voltages, sensor_of, stroke_along
+from controllers.models.voltage import VOLTAGE_LIMIT
 from controllers.registry import Reference
 from pma_gym.envs import StationInfo
 from pma_gym.plant.plant import Plant

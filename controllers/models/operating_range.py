@@ -1,7 +1,4 @@
-"""The local models of a station's task, and what its sensors and voltages are there.
-
-Voltages of the actuators: their limit, and those at which a trial rests.
-"""
+"""The local models of a station's task, and what its sensors and voltages are there."""
 
 import math
 from functools import lru_cache
@@ -91,26 +88,3 @@ def sensor_of(station: StationInfo, quantity: str) -> tuple[float, float]:
     lag = 1.0 / (2.0 * math.pi * sensor.bandwidth) if sensor is not None else 0.0
     level = sensor.noise if sensor is not None else 0.0
     return lag, math.hypot(level, sensors.SENSORS[name].resolution / math.sqrt(12.0))
-
-
-VOLTAGE_LIMIT = 10.0
-"""Largest voltage of motor and regulator (V)."""
-
-
-def nominal_offset(station: StationInfo) -> float:
-    """Voltage (V) that changes nothing of how a trial begins.
-
-    Of the motor the one at which the nominal drive just begins to pull, 0 without a drive; of the
-    regulator the one that holds the pressure.
-    """
-    parameters = station.model.parameters
-    if station.task.actuator == "regulator":
-        line = parameters["regulator_line"]
-        return (station.pressure - line.offset) / line.gain
-    drive = parameters.get("drive")
-    return max(0.0, -drive.offset / drive.gain) if drive else 0.0
-
-
-def rest_voltage(station: StationInfo) -> float:
-    """Voltage of the task's actuator at rest (V): no pull, or what holds the pressure."""
-    return 0.0 if station.task.actuator == "motor" else nominal_offset(station)

@@ -31,7 +31,8 @@ import numpy as np
 from controllers.models.cable import Cable, free_rotor
 from controllers.models.local_model import LocalModel
 from controllers.models.nominal_motion import NominalMotion
-from controllers.models.operating_range import VOLTAGE_LIMIT, nominal_offset, sensor_of
+from controllers.models.operating_range import sensor_of
+from controllers.models.voltage import VOLTAGE_LIMIT, nominal_offset
 from controllers.observers.pressure_filter import PressureFilter
 from pma_gym.envs import Measurement
 

@@ -40,7 +40,7 @@ from typing import TYPE_CHECKING, Generic, TypeVar
 
 from controllers.models.local_model import LocalModel
 from controllers.models.nominal_motion import nominal_motion
-from controllers.models.operating_range import VOLTAGE_LIMIT
+from controllers.models.voltage import VOLTAGE_LIMIT
 from controllers.registry import Reference
 from pma_gym.envs import StationInfo
 

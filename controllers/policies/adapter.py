@@ -1,8 +1,8 @@
 """Connect a policy to a station: readings become entries, actions become volts.
 
-Many policy adapters side by side: the entries and voltages of `PolicyAdapter`, in arrays.
-
 How a policy's action becomes a voltage: as it is, as a change, or added to a controller's.
+
+Many policy adapters side by side: the entries and voltages of `PolicyAdapter`, in arrays.
 """
 
 import math
@@ -15,7 +15,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from controllers.models.operating_range import rest_voltage
+from controllers.models.voltage import rest_voltage
 from controllers.policies.observation_spec import (
     ObservationSpec,
     ahead,

@@ -4,7 +4,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pma_gym.codegen.machine.native import simd_lanes
-from pma_gym.engine.cpu.block_memory import ARGUMENTS, BEFORE, Kernel
+from pma_gym.engine.cpu.block_memory import ARGUMENTS, BEFORE
+from pma_gym.engine.cpu.kernel import Kernel
 from pma_gym.engine.observation import ObservationTable
 from pma_gym.engine.options import Options
 from pma_gym.engine.state_layout import StateLayout

@@ -9,7 +9,6 @@ from typing import Any, Self, TypedDict
 import numpy as np
 
 from pma_gym.data.trial_checks import check_memory_at_start
-from pma_gym.engine.actions import RewardFunction, check_reward_function
 from pma_gym.engine.option_checks import (
     Pressure,
     check_keywords,
@@ -23,6 +22,7 @@ from pma_gym.engine.option_checks import (
     plain_options,
     unknown_name,
 )
+from pma_gym.engine.reward_function import RewardFunction, check_reward_function
 from pma_gym.pickling import Packed, packed
 from pma_gym.plant.compiled_model import DEFAULT_TOLERANCE, check_tolerance
 from pma_gym.plant.memory_start import begun_at

@@ -28,12 +28,13 @@ from pma_gym.codegen.machine.native import compiled, simd_lanes
 from pma_gym.codegen.machine.simd import SimdEmitter
 from pma_gym.codegen.trace import live_inputs, substitute
 from pma_gym.effects.user_effects import source_of
-from pma_gym.integrator.equations import COMMANDS, ZERO, System, rates, step_start_values
+from pma_gym.integrator.equations import COMMANDS, ZERO
 from pma_gym.integrator.integration import memory
+from pma_gym.integrator.system import System, rates, step_start_values
 from pma_gym.integrator.trial_kernel import write_simulate
-from pma_gym.plant.compiled_model import static_force, system
 from pma_gym.plant.composition import PlantEquations
 from pma_gym.plant.model import Model
+from pma_gym.plant.system import static_force, system
 
 FIRST_S = 7e-4
 """Size of the first step attempt from rest (s)."""

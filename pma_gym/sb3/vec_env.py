@@ -15,7 +15,7 @@ from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices, VecEnvO
 
 from pma_gym.engine.option_checks import check_known, parse_pressure
 from pma_gym.envs.member import TOGETHER, BatchMember, refusal
-from pma_gym.envs.specs import is_id, registered
+from pma_gym.envs.registered import is_id, registered
 from pma_gym.envs.summary import last_info
 from pma_gym.envs.vector import PMAVectorEnv
 from pma_gym.tasks import Task

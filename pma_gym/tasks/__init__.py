@@ -1,12 +1,9 @@
 """Tasks: what to follow, what it is worth, when it ends, what is drawn and what disturbs."""
 
 from pma_gym.tasks.disturbances import DISTURBANCES, PULSE_S, Disturbances, Events
+from pma_gym.tasks.exercise import LOWEST_RATE_HZ, PACE, PLAN_ANGLES, Exercise
 from pma_gym.tasks.exercises import (
     EXERCISES,
-    LOWEST_RATE_HZ,
-    PACE,
-    PLAN_ANGLES,
-    Exercise,
     isokinetic_exercise,
     isotonic_exercise,
     moment_exercise,

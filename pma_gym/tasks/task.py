@@ -16,13 +16,13 @@ from pma_gym.data.trial_schedule import DISPLACEMENT, ROTATION, TrialSchedule
 from pma_gym.metrics import PHASE_DURATION, PHASE_SAMPLES, SAMPLE_RATE_HZ, rmse
 
 if TYPE_CHECKING:
-    from pma_gym.tasks.exercises import Exercise
+    from pma_gym.tasks.exercise import Exercise
 from collections.abc import Callable, Mapping
 
 from pma_gym.codegen.generic import where
 from pma_gym.effects.arithmetic import exponential
 from pma_gym.plant.model import Model
-from pma_gym.tasks.exercises import Exercise
+from pma_gym.tasks.exercise import Exercise
 from pma_gym.units import SI_FACTORS
 
 TRIAL_TAIL_S = (PHASE_SAMPLES - 1) / SAMPLE_RATE_HZ - PHASE_DURATION

@@ -9,7 +9,7 @@ import pytest
 
 from controllers import CONTROLLERS, PID, FeedforwardPID
 from controllers.design.designs import Gains, scheduled_gains
-from controllers.models.operating_range import nominal_offset
+from controllers.models.voltage import nominal_offset
 from pma_gym.envs import PMAEnv
 from pma_gym.plant.model import load_model
 from pma_gym.tasks import EVERY_TASK, isotonic

@@ -110,7 +110,7 @@ def test_zeros_are_the_same_however_many_readings_are_computed_at_once(monkeypat
         env = make()
         env.reset(seed=3)
         records.append(env._engine.records.copy())
-        monkeypatch.setattr("pma_gym.engine.cpu.block_memory.simd_lanes", lambda: lanes)
+        monkeypatch.setattr("pma_gym.engine.cpu.kernel.simd_lanes", lambda: lanes)
     np.testing.assert_array_equal(*records)
 
 

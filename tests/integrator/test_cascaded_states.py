@@ -11,8 +11,8 @@ from pma_gym.codegen.graph import CHANGING, FIXED, Graph
 from pma_gym.codegen.text import evaluate
 from pma_gym.integrator.equations import State
 from pma_gym.integrator.step_attempt import cascaded_states, cascaded_step
-from pma_gym.plant.compiled_model import system
 from pma_gym.plant.model import load_model
+from pma_gym.plant.system import system
 
 FREQUENCY = 3.0
 

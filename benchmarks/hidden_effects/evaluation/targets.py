@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from benchmarks.hidden_effects.evaluation.verdicts import RIGHT_STRUCTURE, Outcome
-from benchmarks.hidden_effects.generation.blocks import UGLY
+from benchmarks.hidden_effects.generation.readout_noise import UGLY
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 from scipy.signal import lfilter
 
-from benchmarks.hidden_effects.generation.blocks import NONE, ReadoutNoise, draw_noise
 from benchmarks.hidden_effects.generation.effect_size import (
     Experiment,
     Ruler,
@@ -19,6 +18,7 @@ from benchmarks.hidden_effects.generation.effect_size import (
 from benchmarks.hidden_effects.generation.effects import ALL, KINDS, OUTSIDE, Values
 from benchmarks.hidden_effects.generation.excitation import EXCITATIONS, draw_trial
 from benchmarks.hidden_effects.generation.likelihood_ratios import odds_of_parameters
+from benchmarks.hidden_effects.generation.readout_noise import NONE, ReadoutNoise, draw_noise
 from benchmarks.hidden_effects.physics import rig as rigs
 from benchmarks.hidden_effects.physics.rig import NOMINAL, SENSORS, UNITS, Array
 from benchmarks.hidden_effects.physics.simulation import RATE, Commands

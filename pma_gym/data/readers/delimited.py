@@ -1,13 +1,10 @@
 """Text tables: cells between commas, semicolons, tabs, bars or blanks.
 
 Bytes of a text file to text: UTF-8, UTF-16 with or without its mark, else Windows-1252.
-
-Lines of a text, within the limits before there are any.
 """
 
 import codecs
 import csv
-import io
 import re
 from collections import Counter
 from collections.abc import Sequence
@@ -16,35 +13,9 @@ from dataclasses import replace
 from pma_gym.data.readers import labview
 from pma_gym.data.readers.layout import COMMENTS, Row, arrange
 from pma_gym.data.readers.table import Request, Table, UnreadableError
+from pma_gym.data.readers.text_lines import check_widths, split_lines
 from pma_gym.data.trial_columns import TrialError
 from pma_gym.limits import check_limit, limit
-
-_QUOTED = 20
-"""Times the most columns that a line with quotes may have separators: some stand in cells."""
-
-
-def split_lines(text: str, file: str) -> list[str]:
-    """Lines of a text, each with its end.
-
-    Raises:
-        LimitError: more than the rows that are read.
-    """
-    check_limit(file, "rows", max(text.count("\n"), text.count("\r")))
-    return list(io.StringIO(text, newline=""))
-
-
-def check_widths(lines: Sequence[str], separator: str, file: str) -> None:
-    """Refuse lines with more cells than are read, before they are taken apart.
-
-    Raises:
-        LimitError: names the file and the limit.
-    """
-    most = limit("columns")
-    for line in lines:
-        count = 1 + line.count(separator)
-        if count > most * (_QUOTED if '"' in line or separator == " " else 1):
-            check_limit(file, "columns", count)
-
 
 _MARKS = (
     (codecs.BOM_UTF8, "utf-8"),

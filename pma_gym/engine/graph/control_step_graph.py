@@ -1,69 +1,27 @@
 """A control step without the plant, as traced arithmetic for kernels of any width.
 
 From the action to the drive, from the plant's state to reading, observation, reward and end.
-
-The numbers that a control step reads, as inputs of its graph.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from functools import cached_property
 
 from pma_gym.codegen.generic import to_real, where
-from pma_gym.codegen.graph import CHANGING, HELD, Graph, Value
+from pma_gym.codegen.graph import Value
 from pma_gym.codegen.random import normals, philox
 from pma_gym.codegen.trace import substitute
 from pma_gym.engine.actions import HIGHEST_VOLTAGE
 from pma_gym.engine.graph.exercise_step import ExerciseStep, held_volts
 from pma_gym.engine.graph.scoring import position_of
+from pma_gym.engine.graph.step_inputs import StepInputs
 from pma_gym.engine.observation import BOUND, ObservationTable, Prescribed, measured_position
-from pma_gym.engine.state_layout import HAND_PUSH, NOISE, PARTS, START, TRUTH, StateLayout
-from pma_gym.integrator.equations import COMMANDS, ZERO, Equations, step_start_values
+from pma_gym.engine.state_layout import HAND_PUSH, NOISE, PARTS, TRUTH
 from pma_gym.integrator.step_attempt import first_size
+from pma_gym.integrator.system import step_start_values
 from pma_gym.plant import sensors
 from pma_gym.plant.rigs.station import STATION
 from pma_gym.tasks import REWARDS, broken, missed_reward
 from pma_gym.units import SI_FACTORS
-
-
-@dataclass(frozen=True)
-class StepInputs:
-    """Inputs of a control step by name.
-
-    Attributes:
-        state_layout: places of the numbers.
-        equations: the plant's equations, whose graph all of it is in.
-    """
-
-    state_layout: StateLayout
-    equations: Equations
-
-    @property
-    def graph(self) -> Graph:
-        """The graph of all values."""
-        return self.equations.graph
-
-    def slot(self, name: str) -> Value:
-        """A number of the record, as an input; states and commands are the plant's own."""
-        if name in self.state_layout.states or name in (*COMMANDS, ZERO):
-            return self.equations[name]
-        if name == START or name in self.state_layout.prescribed:
-            return self.graph.input(name, HELD)
-        return self.graph.input(f"record.{name}", CHANGING, self.state_layout.kind(name))
-
-    def action(self, i: int) -> Value:
-        """An entry of the action, as an input."""
-        return self.graph.input(f"action.{i}", CHANGING)
-
-    def reference(self, steps_ahead: int) -> Value:
-        """The reference so many steps after the one that begins (m or rad), as an input."""
-        return self.graph.input(f"reference.{steps_ahead}", CHANGING)
-
-    @property
-    def horizon(self) -> Value:
-        """Control steps after which an episode is truncated, as an input."""
-        return self.graph.input("horizon", CHANGING)
-
 
 FORCE_OF_A_VOLT = 100.0
 """Jump of the hand's force (N) after which steps begin as small as after one of 1 V: about what

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pma_gym.codegen.generic import to_real, where
 from pma_gym.codegen.graph import Value
 from pma_gym.engine.actions import HIGHEST_VOLTAGE
-from pma_gym.engine.graph.control_step_graph import StepInputs
+from pma_gym.engine.graph.step_inputs import StepInputs
 from pma_gym.engine.observation import Prescribed
 from pma_gym.engine.state_layout import FILTER_STATE, NOISE, profile_at_offsets
 from pma_gym.tasks import PACE, MomentProfile, Operator, OperatorState, unsafe

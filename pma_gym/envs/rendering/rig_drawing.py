@@ -9,7 +9,7 @@ from matplotlib.collections import LineCollection
 from matplotlib.patches import Circle, Polygon, Rectangle
 from numpy.typing import NDArray
 
-from pma_gym.envs.rendering.picture import Scene
+from pma_gym.envs.rendering.scene import Scene
 from pma_gym.tasks import PACE, Task
 
 INK, FAINT, STEEL = "#2b2f36", "#c9ced6", "#8d96a3"

@@ -21,7 +21,7 @@ from benchmarks.exercise.safety_episodes import (
 )
 from benchmarks.exercise.safety_layer import read_safety, run_safety, safety_text
 from pma_gym.tasks import EXERCISES, PACED, PACING
-from pma_gym.tasks.exercises import SAFE_MOMENT
+from pma_gym.tasks.exercise import SAFE_MOMENT
 from pma_gym.tasks.safety_filter import FILTER_PACED, FILTER_PACING, filtered_pressure
 
 SAFE = {"safe_moment": 24.0, "safe_speed": 1.0}

@@ -13,7 +13,8 @@ from benchmarks.report.margins import load_step, loops
 from benchmarks.report.plot_style import styles_of
 from benchmarks.suites.frozen import frozen_suite
 from controllers import CONTROLLERS
-from controllers.models.operating_range import nominal_offset, rest_voltages
+from controllers.models.operating_range import rest_voltages
+from controllers.models.voltage import nominal_offset
 from pma_gym.envs import PMAEnv, StationInfo
 from pma_gym.plant.model import load_model
 from pma_gym.plant.plant import Plant

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from controllers.models.operating_range import nominal_offset
+from controllers.models.voltage import nominal_offset
 from controllers.policies.adapter import ActionMapping, PolicyAdapter
 from controllers.policies.observation_spec import ObservationSpec
 from pma_gym.envs import Measurement, PMAEnv, StationInfo

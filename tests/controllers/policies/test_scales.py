@@ -2,7 +2,7 @@
 
 import pytest
 
-from controllers.models.operating_range import nominal_offset
+from controllers.models.voltage import nominal_offset
 from controllers.policies.adapter import ActionMapping, PolicyAdapter
 from controllers.policies.observation_spec import ObservationSpec, delayed_rows
 from pma_gym.envs import Measurement, StationInfo

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from controllers import Policy, PPOPolicy
-from controllers.models.operating_range import nominal_offset
+from controllers.models.voltage import nominal_offset
 from controllers.policies.policy_file import load_policy_file
 from controllers.policy import shipped_policies
 from pma_gym.envs import ENVIRONMENTS, PMAEnv
