@@ -184,7 +184,7 @@ class ILC:
         ...         volts = controller.act(env.measurement, env.time)
         ...         *_, ended, info = env.step(env.action(volts))
         ...     left.append(info["rmse_mm"])
-        >>> left[2] < 0.5 * left[0]
+        >>> bool(left[2] < 0.5 * left[0])
         True
 
     Source:

@@ -89,7 +89,7 @@ SLOW = {
     "pma_gym.discovery.diagnose": lambda trials, model, **rest: _stop(model),
     "pma_gym.discovery.refit": lambda trials, model, **rest: _stop(model),
     "pma_gym.envs.PMAEnv.picture": lambda env: _stop(env.station.model),
-    "benchmarks.reproduction.job.run_job": lambda suite, *rest: _stop(suite.nominal_of(0)),
+    "benchmarks.reproduction.reproduce.run_job": lambda suite, *rest: _stop(suite.nominal_of(0)),
     "benchmarks.tuning.tune.run_tune": lambda out, seed, model, *rest: _stop(
         pma_gym.load_model(model)
     ),

@@ -131,7 +131,7 @@ class Trial:
         A notebook shows the figure; a script calls its `show()`, or `savefig("trial.png")`.
         """
         # Imported here: most programs that use trials draw none, and Matplotlib takes a while.
-        from pma_gym.data.trial_comparison import plot_series, series_of
+        from pma_gym.data.trial_plot import plot_series, series_of
 
         return plot_series({"": series_of(self)})
 

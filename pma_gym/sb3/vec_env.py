@@ -69,7 +69,7 @@ class EngineVecEnv(VecEnv):
             AttributeError: another attribute; says what can be done instead.
             ValueError: a pressure out of range, as of the option.
         """
-        if attr_name != "pressure_kpa":
+        if attr_name not in SETTABLE:
             raise AttributeError(refusal(attr_name))
         pressure = parse_pressure(value, self.envs.engine.nominal_model)
         self.envs.set_pressures({one.index: pressure for one in self._members(indices)})
@@ -101,6 +101,10 @@ class EngineVecEnv(VecEnv):
     def get_images(self) -> Sequence[np.ndarray | None]:
         """Return a picture of each environment, or None without a render mode."""
         return self.envs.render() or [None] * self.num_envs
+
+
+SETTABLE = ("pressure_kpa",)
+"""What `SB3VecEnv.set_attr` sets: environments that share an engine share everything else."""
 
 
 class SB3VecEnv(EngineVecEnv):

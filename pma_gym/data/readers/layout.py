@@ -112,15 +112,14 @@ def arrange(
     if not rows:
         return Table(file, [], [], [], provenance or {}, part)
     at, header = _header(file, rows, request)
-    top = [row for row in rows[: max(at, 0)]]
-    if top:
+    if top := rows[: max(at, 0)]:
         remarks.append(f"{_span(top)} above the header {_are(top)} passed over")
     first = next((i for i in range(at + 1, len(rows)) if _is_sample(rows[i][1])), len(rows))
     units, others = _units(rows[at + 1 : first], len(header))
     time = next((i for i, name in enumerate(header) if request.is_time(name)), 0)
-    last = len(rows)
-    while last > first and not _may_be_sample(rows[last - 1][1], time):
-        last -= 1
+    last = next(
+        (i for i in range(len(rows), first, -1) if _may_be_sample(rows[i - 1][1], time)), first
+    )
     if first == last and (others or rows[last:]):
         remarks = [_unread((others or rows[last:])[0], header, time)]
     elif others:
