@@ -160,6 +160,8 @@ def diagnose(*trials, **options):
     threading.Timer(0.2, os.kill, (os.getpid(), signal.SIGINT)).start()
     hashlib.pbkdf2_hmac("sha256", b"", b"", 2**31 - 1)
 
+# A process in the background ignores Ctrl-C, and its children inherit that.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 discovery.diagnose = diagnose
 main(["diagnose", "lab"])
 """

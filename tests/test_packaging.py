@@ -72,6 +72,7 @@ def test_text_that_names_modules_is_renamed():
     assert renamed_strings("- benchmarks.training.a:") == "- pma_gym_benchmarks.training.a:"
 
 
+@pytest.mark.campaign
 def test_the_second_wheels_tree_runs_without_the_clones_names(tmp_path):
     """Its modules import each other by their own names, and one trial is scored."""
     write_tree(tmp_path)

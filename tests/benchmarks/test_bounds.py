@@ -34,6 +34,7 @@ def refuses(model, task, kpa):
     raise AssertionError("it was computed again")
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize("started", [False, True])
 def test_a_bound_is_computed_once_and_kept(started, tmp_path):
     with Bounds("station", tmp_path, table) as bounds:

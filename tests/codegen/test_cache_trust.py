@@ -250,6 +250,7 @@ def test_a_cache_that_was_emptied_meanwhile_is_made_again(entry):
     assert value(True) == 1.0
 
 
+@pytest.mark.campaign
 def test_processes_that_make_the_key_at_once_end_with_one(tmp_path):
     code = (
         "import sys, pathlib\n"

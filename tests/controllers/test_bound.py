@@ -30,12 +30,14 @@ def test_no_controller_comes_closer_in_rotation(drive):
         assert all(bound[phase] <= 1.02 * got[phase] for phase in bound)
 
 
+@pytest.mark.campaign
 def test_no_controller_comes_closer_in_displacement(drive):
     bound = bound_of("station", "displacement", 300)["displacement"]
     for make in RIVALS:
         assert bound <= 1.02 * drive(make(), "displacement", 300)[0]["displacement"]
 
 
+@pytest.mark.campaign
 def test_phase_three_is_limited_by_what_the_drive_cannot_push():
     # More friction of the rotor brakes it sooner where the cable hangs loose.
     model = load_model("station")

@@ -1,8 +1,11 @@
 """The pages that say how to add something work as they stand, and touch three or four files."""
 
+import pytest
+
 from tests.development.drill import copied, follow, run_pytest
 
 
+@pytest.mark.campaign
 def test_a_controller_is_three_files(tmp_path):
     copy = copied(
         tmp_path, "controllers", "pyproject.toml", "docs/reference/controllers.md",
@@ -49,6 +52,7 @@ def test_a_rig_is_three_files(tmp_path):
     assert "3 passed" in done.stdout
 
 
+@pytest.mark.campaign
 def test_a_sensor_is_four_files(tmp_path):
     copy = copied(
         tmp_path, "pma_gym", "pyproject.toml", "tests/effects/conftest.py",

@@ -53,6 +53,7 @@ def test_a_single_environment_says_by_what_it_ended():
     assert env.ended_by == "" == env.episode_summary()["ended_by"]
 
 
+@pytest.mark.campaign
 def test_ids_with_their_module_are_made_in_a_fresh_worker():
     pytest.importorskip("stable_baselines3")
     from stable_baselines3.common.env_util import make_vec_env

@@ -121,6 +121,7 @@ def test_it_stands_beside_the_others(tmp_path):
     assert "6 of them done before" in again.stdout and "rank 2 of 2" in again.stdout
 
 
+@pytest.mark.campaign
 def test_after_three_failures_the_rest_is_left(tmp_path):
     (tmp_path / "small.toml").write_text(SUITE)
     spec = own(tmp_path, "return 1 / 0")

@@ -93,6 +93,7 @@ def table(out):
     return [{name: value for name, value in row.items() if name not in TIMES} for row in rows]
 
 
+@pytest.mark.campaign
 def test_a_run_that_is_interrupted_and_killed_ends_as_if_it_had_not_been(suite, tmp_path):
     slow = own(tmp_path, "Slow", sleep=0.0004)
     out = tmp_path / "out"

@@ -138,6 +138,7 @@ def test_ctrl_c_ends_what_is_in_progress_at_once(tmp_path):
     assert not (tmp_path / "3").exists()
 
 
+@pytest.mark.campaign
 def test_a_piece_that_takes_too_long_is_ended_and_the_others_are_not():
     results = {}
     works = [loops, partial(squared, 3), partial(exits, 3), partial(squared, 4)]
@@ -278,6 +279,7 @@ def cluster():
         os.environ["RAY_ADDRESS"] = previous
 
 
+@pytest.mark.campaign
 @pytest.mark.filterwarnings("ignore")
 def test_a_ray_cluster_does_what_one_process_does(cluster, tmp_path):
     works = [partial(squared, number) for number in range(6)]
@@ -288,6 +290,7 @@ def test_a_ray_cluster_does_what_one_process_does(cluster, tmp_path):
     assert isinstance(results[6], ValueError) and results[7] == "alive"
 
 
+@pytest.mark.campaign
 @pytest.mark.filterwarnings("ignore")
 def test_a_ray_worker_that_is_killed_costs_its_own_piece_alone(cluster, tmp_path):
     killed = []

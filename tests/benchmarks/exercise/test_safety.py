@@ -63,6 +63,7 @@ def test_the_layer_saves_operators_from_wild_commands(tmp_path):
     assert safety_text(safety) in (tmp_path / "safety.md").read_text()
 
 
+@pytest.mark.campaign
 def test_what_comes_of_an_episode_does_not_depend_on_how_many_there_are():
     few = {(t.task, t.stations, t.agent): t for t in measure(14, 5, True, ThisProcess())}
     # The same counts from several processes.

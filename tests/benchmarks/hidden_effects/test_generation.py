@@ -128,6 +128,7 @@ def test_the_lab_believes_in_no_friction(lab):
     assert lab.parameters["cable"].slack == 0.0
 
 
+@pytest.mark.campaign
 def test_agrees_with_the_plant_with_nothing_hidden(ours, theirs):
     difference = (ours[0] - theirs) / noise_levels(np.ones(4))
     rms = np.sqrt(np.mean(difference**2, axis=(0, 1)))
@@ -232,6 +233,7 @@ def drawn(tmp_path_factory):
     return folder, case_set
 
 
+@pytest.mark.campaign
 def test_goes_on_after_a_kill(drawn):
     folder, _ = drawn
     cases = [p for p in (folder / "cases").iterdir() if not p.name.startswith(".")]
@@ -286,6 +288,7 @@ def test_trials_stay_within_what_the_rig_bears():
         assert readings[:, 2].max() < 1150.0 and readings[:, 3].max() < 570.0
 
 
+@pytest.mark.campaign
 def test_slow_effects_hide_under_a_drift():
     block = replace(DRAWN["slow_drift"], **TINY)
     truths = [block.draw(11, number).truth for number in (1, 2, 3)]

@@ -78,6 +78,7 @@ def test_an_interrupted_run_keeps_its_cases_and_goes_on_to_the_same_figures(
     assert timeless(json.loads((tmp_path / "score.json").read_text("utf-8"))) == timeless(again)
 
 
+@pytest.mark.campaign
 def test_two_processes_find_what_one_finds(whole, tmp_path):
     records = run_block(order(tmp_path, executor=local(2)))
     assert records is not None and timeless(records) == timeless(whole[1])
@@ -203,6 +204,7 @@ def case():
     return draw_undecidable(90003, 1, "regulator_delay")
 
 
+@pytest.mark.campaign
 def test_an_undecidable_case_keeps_what_the_ruler_promised(case):
     (hidden,) = case.truth["effects"]
     assert case.truth["why"]["nothing"] <= UNTOLD and hidden["witness"]["r"] >= SHOWN

@@ -90,6 +90,7 @@ print(json.dumps(fitted_parameters(identify(station_limits(), pressure_steps()))
 """
 
 
+@pytest.mark.campaign
 def test_two_kernels_of_openblas_print_the_shipped_values(station):
     """Within one unit of the last printed digit; of each other, of the last digit in the file."""
     everything = {k: v for k, v in os.environ.items() if k != "OPENBLAS_L2_SIZE"}

@@ -91,6 +91,7 @@ def test_a_failed_case_is_off_by_the_whole_range():
         assert pooled_measure([task]).of_row(row) == pytest.approx(100.0)
 
 
+@pytest.mark.campaign
 def test_figures_do_not_depend_on_the_order_of_the_rows():
     suite = simulated_suite()
     rows = simulated_rows(suite)

@@ -164,6 +164,7 @@ def test_an_interrupt_leaves_what_is_done():
     assert kept == [0, 1]
 
 
+@pytest.mark.campaign
 def test_ctrl_c_leaves_finished_cases_and_the_earlier_results(tmp_path):
     marker, out = tmp_path / "third", tmp_path / "out"
     out.mkdir()

@@ -167,6 +167,7 @@ def test_machines_are_of_all_sizes():
     assert all(len(rig.pressures) == 4 for rig in rigs)
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize("seed", [0, 2, 5])
 def test_with_its_true_numbers_a_lab_s_model_leaves_the_sensor_s_noise(seed, tmp_path):
     """Two programs that know nothing of each other give the same force."""

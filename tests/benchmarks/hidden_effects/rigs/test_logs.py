@@ -131,6 +131,7 @@ def test_what_a_refit_can_do_is_no_effect():
     assert effect_size.size(other, 1e-6) < 0.15 * effect_size.size(bent, 1e-6)
 
 
+@pytest.mark.campaign
 def test_the_size_is_the_misfit_of_a_refitted_model():
     """Against a refit by simulation: mass, damping and the start of every window free."""
     from scipy.optimize import least_squares
