@@ -23,7 +23,6 @@ ONLY = "only an MlpPolicy of PPO, SAC, TD3 or TQC can be exported"
 
 OUTPUTS = {
     "stable_baselines3.common.policies.ActorCriticPolicy": "clip",
-    "pma_gym.sb3.policy.LeanMlpPolicy": "clip",
     "stable_baselines3.sac.policies.SACPolicy": "tanh",
     "stable_baselines3.td3.policies.TD3Policy": "tanh",
     "sb3_contrib.tqc.policies.TQCPolicy": "tanh",

@@ -28,10 +28,7 @@ ALGORITHMS = {
 }
 """Where each algorithm's class is."""
 
-ACTOR_CRITIC = (
-    "stable_baselines3.common.policies",
-    "pma_gym.sb3.policy",
-)
+ACTOR_CRITIC = ("stable_baselines3.common.policies",)
 """Where policies are that PPO shares with A2C; only PPO has a `clip_range`."""
 
 UNREADABLE = (
