@@ -305,7 +305,7 @@ def rollouts(name: str, count: int, **options: Any) -> Chunk:
     torch.set_num_threads(1)
     own = name.startswith("pma_gym/")
     envs = SB3VecEnv(count, name) if own else make_vec_env(name, count, seed=0)
-    model = PPO("MlpPolicy", envs, seed=0, device="cpu", **options)
+    model: Any = PPO("MlpPolicy", envs, seed=0, device="cpu", **options)
     _, callback = model._setup_learn(total_timesteps=1 << 40)
 
     def chunk() -> int:
