@@ -66,8 +66,6 @@ LOWER = .lower-bounds
 LOWER_EXTRAS = bench,rl,rllib,scale,mpc,policies,onnx,view,files,symbolic,baselines
 LOWER_TESTS = tests/test_requirements.py tests/test_cli.py tests/data tests/codegen \
     tests/integrator tests/plant tests/estimation tests/controllers tests/engine tests/envs tests/sb3
-# It changes PyTorch's number of threads many times, and old PyTorch starts threads anew each time.
-LOWER_TESTS += --ignore=tests/sb3/test_threads.py
 
 test-lower-bounds: ## Install every lower bound of pyproject.toml into .lower-bounds/ and run tests.
 	"$(PYTHON)" -m venv "$(LOWER)"

@@ -26,8 +26,7 @@ def register(app: typer.Typer) -> None:
         epilog="Example: python -m benchmarks train --algo ppo --task displacement --seed 1"
     )(train)
     app.command(
-        epilog="Example: python -m benchmarks export model.zip "
-        "--env pma_gym/IsokineticRotation-v0 --trust"
+        epilog="Example: python -m benchmarks export model.zip --env pma_gym/IsokineticRotation-v0"
     )(export)
 
 
@@ -51,11 +50,7 @@ def train(
         Path | None,
         typer.Option(help="Else results/training/PRESET-ALGO/TASK-SEED."),
     ] = None,
-    device: Annotated[str, typer.Option(help="Of PyTorch: cpu, cuda.")] = "cpu",
     threads: Annotated[int, typer.Option(min=1, help="Of PyTorch and the environments.")] = 1,
-    patience: Annotated[
-        int, typer.Option(min=0, help="Validations without progress, then end; 0: never.")
-    ] = 0,
     ship: Annotated[bool, typer.Option("--ship", help="Put the policy into the package.")] = False,
     jobs: Jobs = 1,
     executor: ExecutorOption = LOCAL,
@@ -64,14 +59,14 @@ def train(
     usual = RESULTS / "training" / f"{Path(preset).stem}-{algo}"
     folder = out or usual / f"{task}-{seed}"
     with _failures_in_words(folder):
-        from benchmarks.training.configuration.preset import PresetError
+        from benchmarks.training.preset import PresetError
         from benchmarks.training.train_policies import ordered, run_seeds, run_train
         from pma_gym.terminal import SafeConsole
 
         places = chosen_executor(executor, jobs)
         if folder.exists() and not folder.is_dir():
             raise PresetError(f"--out {folder} is a file; name a folder")
-        order = ordered(algo, task, preset, seed, steps, device, threads, patience)
+        order = ordered(algo, task, preset, seed, steps, threads)
         if ship and seeds > 1:
             raise PresetError(f"--ship takes one seed, got --seeds {seeds}; name it by --seed")
         if seeds == 1 and executor is LOCAL:
@@ -88,11 +83,11 @@ def _failures_in_words(folder: Path) -> Iterator[None]:
     """End the program with a message of what stopped a training.
 
     Args:
-        folder: of its checkpoints.
+        folder: of its checkpoint.
     """
     try:
         from benchmarks.training.checkpoint import CheckpointError
-        from benchmarks.training.configuration.preset import PresetError
+        from benchmarks.training.preset import PresetError
         from benchmarks.training.train_policies import run_train  # noqa: F401 - needs Stable-Baselines3
     except ImportError as error:
         print(
@@ -110,7 +105,7 @@ def _failures_in_words(folder: Path) -> Iterator[None]:
         raise typer.Exit(1) from None
     except KeyboardInterrupt:
         print(
-            f"Interrupted; run it again, it goes on from the checkpoints in {folder}",
+            f"Interrupted; run it again, it goes on from {folder}/checkpoint.zip",
             file=sys.stderr,
         )
         raise typer.Exit(INTERRUPTED) from None
@@ -120,29 +115,24 @@ def export(
     model: Annotated[Path, typer.Argument(help="Zip that Stable-Baselines3 saved.")],
     env: Annotated[str, typer.Option(help="Id of the environment that it was trained on.")],
     env_kwargs: Annotated[str, typer.Option(help="Its keyword arguments, as JSON.")] = "{}",
-    algo: Annotated[str, typer.Option(help="ppo, sac, td3 or tqc; else read off.")] = "",
     vecnormalize: Annotated[
-        Path | None, typer.Option(help="Its statistics, if it was trained in a VecNormalize.")
+        Path | None, typer.Option(help="Its statistics (.npz), if trained in a VecNormalize.")
     ] = None,
     out: Annotated[
         Path | None,
         typer.Option(help="DIR/NAME of the policy; results/policies/MODEL if not given."),
     ] = None,
     onnx: Annotated[bool, typer.Option("--onnx", help="Write NAME.onnx too.")] = False,
-    trust: Annotated[
-        bool, typer.Option("--trust", help="Load the zip, which runs whatever code is in it.")
-    ] = False,
 ) -> None:
     """Make a policy file of your own model, which the benchmark runs without torch."""
-    from benchmarks.training.policy_export.users_model import Order, export_model, parsed_kwargs
+    from benchmarks.training.export import export_model, parsed_kwargs
 
     try:
         kwargs = parsed_kwargs(env_kwargs)
         usual = RESULTS / "policies" / model.stem
-        order = Order(model, env, kwargs, out or usual, algo, vecnormalize, onnx, trust)
-        if out is None and trust:
+        if out is None:
             usual.parent.mkdir(parents=True, exist_ok=True)
-        written = export_model(order)
+        written = export_model(model, env, kwargs, out or usual, vecnormalize, onnx)
     except ValueError as error:
         refuse(error)
     print("\n".join(map(str, written)))

@@ -136,7 +136,7 @@ are no cheaper by the dozen."""
 
 def all_rows() -> list[Row]:
     """Every row, in the order of the table."""
-    return [*_single(), *_batches(), *_learning()]
+    return [*_single(), *_batches(), *_rollouts()]
 
 
 def _single() -> Iterator[Row]:
@@ -195,15 +195,10 @@ def _sizes(
         yield Row(f"batch/{key}/{count}", f"{title}, {count}", peer, make, each, cores)
 
 
-def _learning() -> Iterator[Row]:
-    for make in ("rollouts", "learning"):
-        title, toy = f"PPO {make}, 8 copies of Pendulum-v1", {"name": "Pendulum-v1", "count": 8}
-        yield Row(f"{make}/Pendulum/8", title, SB3, make, toy)
-    for make, count, options in (
-        ("rollouts", 64, {}),
-        ("rollouts", 256, {}),
-        ("learning", 256, {"batch_size": 4096, "threads": 2}),
-    ):
-        title = f"PPO {make}, pma-gym, batch of {count}"
-        settings = {"name": DISPLACEMENT, "count": count, "n_steps": 128} | options
-        yield Row(f"{make}/own/{count}", title, SB3, make, settings)
+def _rollouts() -> Iterator[Row]:
+    toy = {"name": "Pendulum-v1", "count": 8}
+    yield Row("rollouts/Pendulum/8", "PPO rollouts, 8 copies of Pendulum-v1", SB3, "rollouts", toy)
+    for count in (64, 256):
+        title = f"PPO rollouts, pma-gym, batch of {count}"
+        settings = {"name": DISPLACEMENT, "count": count, "n_steps": 128}
+        yield Row(f"rollouts/own/{count}", title, SB3, "rollouts", settings)

@@ -57,7 +57,6 @@ TARGETS = (
     (BATCH, "batch/envpool_CartPole/1024", 1.8),
     ("rollouts/own/64", "rollouts/Pendulum/8", 9.0),
     ("rollouts/own/256", "rollouts/Pendulum/8", 18.0),
-    ("learning/own/256", "learning/Pendulum/8", 30.0),
 )
 
 Rates = Mapping[str, Mapping[int, float]]

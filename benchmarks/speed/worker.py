@@ -294,45 +294,22 @@ def _rates(states: dict[str, Any], motor: Any) -> list[Any]:  # noqa: ANN401 - C
     return [made[value.id] for value in rates]
 
 
-def _ppo(name: str, count: int, **options: Any) -> Any:  # noqa: ANN401 - a PPO
-    """PPO that has learned nothing yet: docs/batches.md's on this package's batch, else SB3's."""
-    from stable_baselines3 import PPO
-    from stable_baselines3.common.env_util import make_vec_env
-
-    from pma_gym.sb3 import LeanPPO, SB3VecEnv
-
-    options |= {"seed": 0, "device": "cpu"}
-    if not name.startswith("pma_gym/"):
-        return PPO("MlpPolicy", make_vec_env(name, count, seed=0), **options)
-    # PyTorch's Adam in one pass; eps is Stable-Baselines3's own.
-    adam = {"optimizer_kwargs": {"fused": True, "eps": 1e-5}}
-    return LeanPPO("MlpPolicy", SB3VecEnv(count, name), policy_kwargs=adam, **options)
-
-
 def rollouts(name: str, count: int, **options: Any) -> Chunk:
     """PPO's rollouts without its learning: environments, policy, buffer, advantages."""
     import torch
+    from stable_baselines3 import PPO
+    from stable_baselines3.common.env_util import make_vec_env
+
+    from pma_gym.sb3 import SB3VecEnv
 
     torch.set_num_threads(1)
-    model = _ppo(name, count, **options)
+    own = name.startswith("pma_gym/")
+    envs = SB3VecEnv(count, name) if own else make_vec_env(name, count, seed=0)
+    model: Any = PPO("MlpPolicy", envs, seed=0, device="cpu", **options)
     _, callback = model._setup_learn(total_timesteps=1 << 40)
 
     def chunk() -> int:
         model.collect_rollouts(model.env, callback, model.rollout_buffer, model.n_steps)
-        return model.n_steps * count
-
-    return chunk
-
-
-def learning(name: str, count: int, threads: int = 1, **options: Any) -> Chunk:
-    """PPO from end to end, a rollout and what is learned from it at a time."""
-    import torch
-
-    torch.set_num_threads(threads)
-    model = _ppo(name, count, **options)
-
-    def chunk() -> int:
-        model.learn(total_timesteps=model.n_steps * count, reset_num_timesteps=False)
         return model.n_steps * count
 
     return chunk

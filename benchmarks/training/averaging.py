@@ -4,7 +4,6 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 import torch
-from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.callbacks import BaseCallback
 
 SPANS = 7.0
@@ -19,52 +18,48 @@ class WeightAverage(BaseCallback):
         Averaging", SIAM Journal on Control and Optimization 30; here with exponential weights.
 
     Args:
-        share: time constant of the average, as a share of the whole training.
-        total: control steps of the whole training; those of `learn` if not given.
+        share: time constant of the average, as a share of the whole training; 0 for no average.
 
     Attributes:
-        weights: the average of each of the policy's parameters; None before it began.
-        seen: control steps at which it was updated last.
+        weights: the average of each of the policy's parameters; none before it begins.
     """
 
-    def __init__(self, share: float, total: int | None = None) -> None:
+    def __init__(self, share: float) -> None:
         super().__init__()
-        self.share, self.total = share, total
-        self.weights: list[torch.Tensor] | None = None
-        self.seen = 0
+        self.share = share
+        self.weights: list[torch.Tensor] = []
+
+    def _on_training_start(self) -> None:
+        self._updated = self.model.num_timesteps
 
     def _on_step(self) -> bool:
         return True
 
     def _on_rollout_start(self) -> None:
-        total = self.total or int(self.model._total_timesteps)
-        since, self.seen = self.model.num_timesteps - self.seen, self.model.num_timesteps
-        if self.seen < (1.0 - SPANS * self.share) * total:
+        now, total = self.model.num_timesteps, self.model._total_timesteps
+        since, self._updated = now - self._updated, now
+        if now < (1.0 - SPANS * self.share) * total:
             return
-        now = [parameter.data for parameter in self.model.policy.parameters()]
-        if self.weights is None:
-            self.weights = [one.clone() for one in now]
-            return
+        own = self._own()
+        if not self.weights:
+            self.weights = [one.clone() for one in own]
         weight = min(1.0, since / (self.share * total))
-        for mean, one in zip(self.weights, now, strict=True):
+        for mean, one in zip(self.weights, own, strict=True):
             mean.lerp_(one, weight)
 
+    @contextmanager
+    def applied(self) -> Iterator[None]:
+        """Inside, the model has the averaged weights, if there are any."""
+        own = [one.clone() for one in self._own()]
+        try:
+            self._set(self.weights or own)
+            yield
+        finally:
+            self._set(own)
 
-@contextmanager
-def averaged(model: BaseAlgorithm, average: WeightAverage | None) -> Iterator[None]:
-    """Inside, a model has its averaged weights, if there are any."""
-    if average is None or average.weights is None:
-        yield
-        return
-    now = [parameter.data.clone() for parameter in model.policy.parameters()]
-    set_weights(model, average.weights)
-    try:
-        yield
-    finally:
-        set_weights(model, now)
+    def _own(self) -> list[torch.Tensor]:
+        return [parameter.data for parameter in self.model.policy.parameters()]
 
-
-def set_weights(model: BaseAlgorithm, weights: list[torch.Tensor]) -> None:
-    """Give each of a policy's parameters a value."""
-    for parameter, one in zip(model.policy.parameters(), weights, strict=True):
-        parameter.data.copy_(one)
+    def _set(self, weights: list[torch.Tensor]) -> None:
+        for parameter, one in zip(self._own(), weights, strict=True):
+            parameter.copy_(one)

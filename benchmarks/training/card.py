@@ -1,12 +1,71 @@
 """A trained policy's files: the policy, and a card that says how it was trained."""
 
 from pathlib import Path
+from typing import Any
 
+from benchmarks.runner.provenance import ROOT, git_state
+from benchmarks.training.preset import Preset
 from benchmarks.training.stations import TRAINING, VALIDATION
-from controllers.design.designs import EXERCISE_KINDS
+from benchmarks.training.validation import Point, unit_of
+from controllers.design.designs import EXERCISE_KINDS, loop_name, task_kind
+from controllers.policies.network import Weights
 from controllers.policies.policy_file import PolicyFile, save_policy_file
 from controllers.policy import POLICIES
 from pma_gym.envs import ENVIRONMENTS
+
+
+def policy_name(preset: Preset) -> str:
+    """Return the name of a preset's policies: kind of task, loop, algorithm."""
+    station = preset.env.rig.station
+    return f"{task_kind(station)}-{loop_name(station)}-{preset.algorithm}"
+
+
+def policy_of(
+    preset: Preset, seed: int, weights: Weights, steps: int, curve: list[Point], best: Point
+) -> PolicyFile:
+    """A trained policy with its provenance.
+
+    Args:
+        preset: with what it was trained.
+        seed: of the training.
+        weights: its network.
+        steps: control steps of the training.
+        curve: its validations.
+        best: that of the weights.
+    """
+    view, form, station = preset.env.adapter.view, preset.env.adapter.form, preset.env.rig.station
+    task = (preset.wrapper.get("options") or {}).get("task")
+    loop: dict[str, Any] = {
+        "control_rate_hz": 1.0 / station.period,
+        "action_delay_s": station.action_delay,
+        "observation_delay_s": station.observation_delay,
+        "model": station.model.name,
+    }
+    state = git_state(ROOT)
+    validated = {key: getattr(best, key) for key in ("error", "mean", "broken", "reward")}
+    return PolicyFile(
+        policy_name(preset),
+        f"{preset.algorithm.upper()}, {preset.name}",
+        weights,
+        task_kind(station),
+        {
+            "id": preset.environment,
+            "kwargs": {**preset.options, **({"task": task} if task else {}), **loop},
+        },
+        view,
+        tuple(view.rows(station, form.base)),
+        form,
+        {
+            "algorithm": preset.algorithm,
+            "preset": preset.name,
+            "seed": seed,
+            "steps": steps,
+            "wall_s": round(curve[-1].wall_s, 1),
+            "code": str(state["commit"])[:12] + ("+" if state["dirty"] else ""),
+            "curve": [[point.steps, point.wall_s, point.error] for point in curve],
+            "scores": {"validation": {**validated, "unit": unit_of(preset.task)}},
+        },
+    )
 
 
 def save_policy(policy: PolicyFile, out: Path, ship: bool = False) -> Path:

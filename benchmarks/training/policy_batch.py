@@ -9,7 +9,9 @@ from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvObs, VecEnvStepReturn
 
-from benchmarks.training.reward import bounded
+from benchmarks.training.policy_env import bounded
+from benchmarks.training.preset import Preset
+from benchmarks.training.stations import VALIDATION, VALIDATION_FIRST, Stations
 from controllers.policies.adapter import HIGHEST_V, ActionMapping, BatchPolicyAdapter
 from controllers.policies.observation_spec import ObservationSpec
 from pma_gym.engine.observation import BOUND
@@ -18,7 +20,7 @@ from pma_gym.plant.model import load_model
 from pma_gym.sb3 import EngineVecEnv
 
 
-class PilotedVecEnv(EngineVecEnv):
+class PolicyVecEnv(EngineVecEnv):
     """`PMAVectorEnv` behind a view and a form, for Stable-Baselines3.
 
     Args:
@@ -47,7 +49,7 @@ class PilotedVecEnv(EngineVecEnv):
         reward_scale: float = 1.0,
         **options: Any,
     ) -> None:
-        """Make the environments and who pilots them."""
+        """Make the environments and their policies' adapters."""
         self.envs = PMAVectorEnv(count, task, autoreset_mode=AutoresetMode.DISABLED, **options)
         chosen, model = self.envs.options, load_model(nominal)
 
@@ -55,7 +57,7 @@ class PilotedVecEnv(EngineVecEnv):
             late = chosen.action_delay * chosen.period, chosen.observation_delay * chosen.period
             return StationInfo(model, self.envs.task, pressure, chosen.period, *late)
 
-        self.pilots = BatchPolicyAdapter(count, view, form, station)
+        self.adapters = BatchPolicyAdapter(count, view, form, station)
         self._staggered, self._scale = staggered, reward_scale
         self._length = self.envs.task.steps(chosen.control_rate_hz)
         self._left = np.zeros(count, np.int64)
@@ -65,7 +67,7 @@ class PilotedVecEnv(EngineVecEnv):
         self._all = np.arange(count)
         super().__init__(
             count,
-            spaces.Box(-BOUND, BOUND, (self.pilots.entries,), np.float32),
+            spaces.Box(-BOUND, BOUND, (self.adapters.entries,), np.float32),
             spaces.Box(-1.0, 1.0, (1,), np.float32),
         )
 
@@ -78,8 +80,8 @@ class PilotedVecEnv(EngineVecEnv):
             self._left[:] = generator.integers(1, self._length + 1, self.num_envs)
         self._reset_seeds()
         self._returns[:] = 0.0
-        self.pilots.begin(self._all, self.envs.pressures)
-        return self.pilots.update(self.envs.measurements(), self._all)
+        self.adapters.begin(self._all, self.envs.pressures)
+        return self.adapters.update(self.envs.measurements(), self._all)
 
     def step_async(self, actions: np.ndarray) -> None:
         """Keep the actions of the next step."""
@@ -87,12 +89,12 @@ class PilotedVecEnv(EngineVecEnv):
 
     def step_wait(self) -> VecEnvStepReturn:
         """Step; an environment whose episode ends returns the next one's first entries."""
-        volts = self.pilots.volts(self._actions[:, 0].astype(np.float64))
+        volts = self.adapters.volts(self._actions[:, 0].astype(np.float64))
         commands = volts[:, None] * (2.0 / HIGHEST_V) - 1.0
         _, rewards, terminated, truncated, info = self.envs.step(commands)
         self._returns += rewards
         self._left -= 1
-        entries = self.pilots.update(self.envs.measurements())
+        entries = self.adapters.update(self.envs.measurements())
         learned = bounded(rewards, terminated, self._scale)
         over = terminated | truncated | (self._left == 0)
         infos = self._nothing.copy()
@@ -101,7 +103,7 @@ class PilotedVecEnv(EngineVecEnv):
             for i in which.tolist():
                 infos[i] = self._last(i, entries[i].copy(), info, bool(terminated[i]))
             self._begin_again(which, over)
-            entries[which] = self.pilots.update(self.envs.measurements(), which)
+            entries[which] = self.adapters.update(self.envs.measurements(), which)
         return entries, learned.astype(np.float32), over, infos
 
     def _last(
@@ -111,7 +113,7 @@ class PilotedVecEnv(EngineVecEnv):
         last: dict[str, Any] = {
             "terminal_observation": entries,
             "TimeLimit.truncated": not broken,
-            "episode": {"r": float(self._returns[i]), "l": int(self.pilots.steps[i]), "t": 0.0},
+            "episode": {"r": float(self._returns[i]), "l": int(self.adapters.steps[i]), "t": 0.0},
         }
         scored = [key for key in info if key.startswith("rmse_") and info[f"_{key}"][i]]
         return last | {key: float(info[key][i]) for key in scored}
@@ -120,4 +122,50 @@ class PilotedVecEnv(EngineVecEnv):
         self.envs.reset(options={"reset_mask": over})
         self._returns[which] = 0.0
         self._left[which] = np.iinfo(np.int64).max
-        self.pilots.begin(which, self.envs.pressures[which])
+        self.adapters.begin(which, self.envs.pressures[which])
+
+
+PRESSURE_STEP_KPA = 25
+"""Distance of the pressures that episodes begin at (kPa)."""
+
+RESERVE_KPA = 25
+"""What a jump of the regulator needs below the highest pressure (kPa): the rig breaks at 600."""
+
+USUAL = "robust"
+"""Suite whose recipe validation stations are drawn by, if the preset names none."""
+
+
+def training_environments(preset: Preset, threads: int = 1) -> PolicyVecEnv:
+    """Make the environments that a preset trains on."""
+    suite = preset.wrapper.get("stations")
+    drawn = Stations(suite).options if suite else {}
+    return _made(preset, preset.n_envs, drawn, staggered=True, threads=threads)
+
+
+def validation_environments(preset: Preset, threads: int = 1) -> PolicyVecEnv:
+    """Twice as many episodes as there are validation stations, each on one drawn from them.
+
+    Also where a preset trains on the nominal station alone.
+    """
+    drawn = Stations(preset.wrapper.get("stations") or USUAL, VALIDATION_FIRST, VALIDATION)
+    return _made(preset, 2 * VALIDATION, drawn.options, staggered=False, threads=threads)
+
+
+def pressures_kpa(preset: Preset) -> list[float]:
+    """Pressures that episodes begin at (kPa)."""
+    low, high = (round(1e-3 * end) for end in preset.env.rig.task.starts)
+    jumps = "regulator" in str(preset.options.get("disturbances", "none"))
+    top = high - RESERVE_KPA if jumps and high > 575 - RESERVE_KPA else high
+    return [float(p) for p in range(low, top + 1, PRESSURE_STEP_KPA)]
+
+
+def _made(preset: Preset, count: int, drawn: Mapping[str, Any], **how: Any) -> PolicyVecEnv:
+    return PolicyVecEnv(
+        count,
+        preset.task,
+        preset.env.adapter.view,
+        preset.env.adapter.form,
+        str(preset.options.get("model", "station")),
+        reward_scale=preset.wrapper.get("reward_scale", 1.0),
+        **{"pressure_kpa": pressures_kpa(preset), **preset.options, **drawn, **how},
+    )

@@ -1,66 +1,36 @@
-"""One training, leg by leg: a leg depends only on the checkpoint before it.
+"""One training: Stable-Baselines3 learns, and its policy is validated ten times on the way."""
 
-Every leg begins with fresh episodes and seeds of its own, made from the training's seed and the
-leg's number. So a training that was killed goes on from its last checkpoint to the same result.
-"""
-
+import ast
+import copy
 import time
 from collections.abc import Callable
 from contextlib import closing
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 import torch
+from sb3_contrib import TQC
+from stable_baselines3 import PPO, SAC, TD3
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.callbacks import BaseCallback, CallbackList
 from stable_baselines3.common.logger import configure
-from stable_baselines3.common.utils import set_random_seed
+from stable_baselines3.common.noise import NormalActionNoise
+from stable_baselines3.common.utils import LinearSchedule
+from stable_baselines3.common.vec_env import VecEnv
 
-from benchmarks.training.averaging import WeightAverage, averaged, set_weights
+from benchmarks.training.averaging import WeightAverage
 from benchmarks.training.checkpoint import load_checkpoint, save_checkpoint
-from benchmarks.training.configuration.preset import Preset
-from benchmarks.training.environments import (
-    drawing_s,
-    training_environments,
-    validation_environments,
-)
-from benchmarks.training.learner import learner
-from benchmarks.training.validation import Validation, validate
-from pma_gym.document_shape import ListOf, Real
+from benchmarks.training.policy_batch import training_environments, validation_environments
+from benchmarks.training.preset import Preset, PresetError
+from benchmarks.training.validation import Point, validate
 
-MOST_LEGS = 8
-"""Most checkpoints of a training."""
-
-EPISODES = 4
-"""Fewest episodes that an environment has in a leg."""
+CLASSES: dict[str, Any] = {"ppo": PPO, "sac": SAC, "td3": TD3, "tqc": TQC}
+"""Class of each algorithm."""
 
 EVALUATIONS = 10
-"""How often a policy is validated while it learns."""
-
-WORTH = 0.99
-"""Factor on the best error so far that counts as progress."""
-
-
-class Point(NamedTuple):
-    """A place on the learning curve.
-
-    Attributes:
-        steps: control steps so far.
-        wall_s: wall time so far, validation included (s).
-        error: of the validation (mm or deg).
-        broken: validation episodes that broke a limit.
-        reward: mean reward of a validation episode.
-        mean: mean error of all validation episodes (mm or deg).
-    """
-
-    steps: int
-    wall_s: float
-    error: float
-    broken: int
-    reward: float
-    mean: float
+"""How often a policy is validated, and the training saved, while it learns."""
 
 
 @dataclass(frozen=True)
@@ -70,79 +40,65 @@ class Order:
     Attributes:
         preset: with what.
         seed: of everything random in it.
-        device: of PyTorch.
         threads: of PyTorch and of the environments.
-        patience: validations without progress after which it ends; 0 for never.
     """
 
     preset: Preset
     seed: int
-    device: str = "cpu"
     threads: int = 1
-    patience: int = 0
-
-    def to_json(self) -> dict[str, Any]:
-        """All of it that moves the result."""
-        return self.preset.to_json() | {
-            "seed": self.seed,
-            "device": self.device,
-            "threads": self.threads,
-            "patience": self.patience,
-        }
-
-
-@dataclass
-class Course:
-    """Progress of a training.
-
-    Attributes:
-        curve: validations so far.
-        legs: legs that are done.
-        wall_s: wall time of these, and of drawing stations (s).
-        learning_s: the same without validations and drawing (s).
-        stopped: whether it ended at a plateau.
-    """
-
-    curve: list[Point] = field(default_factory=list)
-    legs: int = 0
-    wall_s: float = 0.0
-    learning_s: float = 0.0
-    stopped: bool = False
 
 
 class Trained(NamedTuple):
     """Result of a training.
 
     Attributes:
-        model: with its averaged weights.
-        course: curve and wall time.
-        final: its last validation.
+        model: with the weights of its best validation.
+        curve: its validations.
+        best: the validation with the least mean error, in which a lost station shows.
     """
 
-    model: BaseAlgorithm
-    course: Course
-    final: Validation
+    model: Any
+    curve: list[Point]
+    best: Point
 
 
 OnProgress = Callable[[int, Point | None], None]
 """Is told of progress: control steps so far, and a validation if there was one."""
 
 
-def leg_ends(preset: Preset, length: int) -> list[int]:
-    """Control steps at which legs end.
+def learner(preset: Preset, envs: VecEnv, seed: int) -> BaseAlgorithm:
+    """A model that has learned nothing yet.
 
-    Args:
-        preset: what is trained.
-        length: control steps of an episode.
+    Raises:
+        PresetError: settings that Stable-Baselines3 refuses.
     """
-    legs = preset.steps // (preset.environments * length * EPISODES)
-    legs = max(1, min(MOST_LEGS, legs))
-    return [round(preset.steps * (k + 1) / legs) for k in range(legs)]
+    try:
+        settings = {key: _value(value) for key, value in preset.settings.items()}
+        if preset.noise_std:
+            settings["action_noise"] = NormalActionNoise(np.zeros(1), np.full(1, preset.noise_std))
+        return CLASSES[preset.algorithm]("MlpPolicy", envs, seed=seed, device="cpu", **settings)
+    # Values of any kind go to constructors, which may raise anything.
+    except Exception as error:
+        raise PresetError(f"preset {preset.name}, {preset.algorithm}: {error}") from error
 
 
-def leg_seed(seed: int, leg: int) -> int:
-    """Seed of everything random in a leg; small enough that those of the environments count up."""
-    return int(np.random.SeedSequence([seed, leg]).generate_state(1)[0]) >> 2
+def _value(value: object) -> Any:  # noqa: ANN401
+    """A setting's value as rl-baselines3-zoo reads it, without evaluating anything."""
+    if isinstance(value, str) and value.startswith("lin_"):
+        return LinearSchedule(float(value.removeprefix("lin_")), 0.0, 1.0)
+    if isinstance(value, str) and value.strip().startswith("dict("):
+        return _literal(ast.parse(value.strip(), mode="eval").body)
+    return value
+
+
+def _literal(node: ast.expr) -> Any:  # noqa: ANN401
+    """Value of Python text that has `dict(name=...)`, `nn.ReLU`, `nn.Tanh` and literals alone."""
+    match node:
+        case ast.Call(func=ast.Name(id="dict"), args=[], keywords=pairs):
+            return {str(pair.arg): _literal(pair.value) for pair in pairs}
+        case ast.Attribute(value=ast.Name(id="nn"), attr="ReLU" | "Tanh" as name):
+            return getattr(torch.nn, name)
+    return ast.literal_eval(node)
 
 
 def train(order: Order, out: Path, on_progress: OnProgress) -> Trained:
@@ -150,10 +106,10 @@ def train(order: Order, out: Path, on_progress: OnProgress) -> Trained:
 
     Args:
         order: what is to be trained.
-        out: folder of its checkpoints and logs.
+        out: folder of its checkpoint and logs.
         on_progress: called with the progress.
     Raises:
-        PresetError: a device that is absent.
+        PresetError: settings that Stable-Baselines3 refuses.
         CheckpointError: a checkpoint of another training, a damaged one, or one that cannot be
             saved.
     """
@@ -164,22 +120,16 @@ def train(order: Order, out: Path, on_progress: OnProgress) -> Trained:
         closing(validation_environments(preset, order.threads)) as checks,
         closing(configure(str(out / "log"), _formats())) as log,
     ):
-        model = learner(preset, envs, leg_seed(order.seed, 0), order.device)
+        model = learner(preset, envs, order.seed)
         model.set_logger(log)
-        average = None
-        if preset.average_share:
-            average = WeightAverage(preset.average_share, preset.steps)
-        course = _resumed(order, out, model, average)
-        course.wall_s += drawing_s(preset)
-        ends = leg_ends(preset, int(envs.envs.task.steps(preset.rate_hz)))  # type: ignore[attr-defined]
-        while course.legs < len(ends) and not course.stopped:
-            _leg(order, ends[course.legs], model, average, course, checks, on_progress)
-            content = {"order": order.to_json()} | _as_json(course)
-            save_checkpoint(out / "checkpoints", course.legs, model, average, content)
-        if average is not None and average.weights is not None:
-            set_weights(model, average.weights)
-        final = validate(model, checks, preset.task)
-    return Trained(model, course, final)
+        watch = _Watch(order, checks, out / "checkpoint.zip", on_progress)
+        watch.resume(model)
+        left = preset.n_timesteps - model.num_timesteps
+        if left > 0:
+            callbacks = CallbackList([watch.average, watch])
+            model.learn(left, callback=callbacks, reset_num_timesteps=False)
+        model.policy.load_state_dict(watch.best)
+    return Trained(model, watch.curve, min(watch.curve, key=lambda point: point.mean))
 
 
 def _formats() -> list[str]:
@@ -190,106 +140,54 @@ def _formats() -> list[str]:
     return ["csv", "tensorboard"]
 
 
-_CONTENT = {
-    "curve": ListOf(ListOf(Real(finite=False), len(Point._fields))),
-    "wall_s": Real(),
-    "learning_s": Real(),
-    "stopped": bool,
-}
-"""Shape of what a checkpoint says of its training."""
-
-
-def _resumed(
-    order: Order, out: Path, model: BaseAlgorithm, average: WeightAverage | None
-) -> Course:
-    """Where the training stands, with the model put there."""
-    loaded = load_checkpoint(out / "checkpoints", model, average, _CONTENT, order.to_json())
-    if loaded is None:
-        return Course()
-    legs, content = loaded
-    curve = [Point(*point) for point in content["curve"]]
-    return Course(curve, legs, content["wall_s"], content["learning_s"], content["stopped"])
-
-
-def _as_json(course: Course) -> dict[str, Any]:
-    return {name: getattr(course, name) for name in ("curve", "wall_s", "learning_s", "stopped")}
-
-
-def _leg(
-    order: Order,
-    end: int,
-    model: BaseAlgorithm,
-    average: WeightAverage | None,
-    course: Course,
-    checks: Any,  # noqa: ANN401
-    on_progress: OnProgress,
-) -> None:
-    """Train to a number of control steps."""
-    began = time.perf_counter()
-    seed = leg_seed(order.seed, course.legs)
-    set_random_seed(seed)
-    model.set_random_seed(seed)
-    # Fresh episodes: `learn` resets the environments where there is no last observation.
-    model._last_obs = None
-    watch = _Watch(order, average, course, checks, on_progress, began)
-    callbacks = CallbackList([one for one in (average, watch) if one is not None])
-    model.learn(end - model.num_timesteps, callback=callbacks, reset_num_timesteps=False)
-    watch.validate_at_end()
-    spent = time.perf_counter() - began
-    course.legs += 1
-    course.wall_s += spent
-    course.learning_s += spent - watch.validating_s
-
-
 class _Watch(BaseCallback):
-    """Validates, tells of progress, ends at a plateau."""
+    """Validates, keeps the best weights, saves, tells of progress."""
 
-    def __init__(
-        self,
-        order: Order,
-        average: WeightAverage | None,
-        course: Course,
-        checks: Any,  # noqa: ANN401
-        on_progress: OnProgress,
-        began: float,
-    ) -> None:
+    def __init__(self, order: Order, checks: VecEnv, path: Path, on_progress: OnProgress) -> None:
         super().__init__()
-        self._order, self._average, self._course = order, average, course
-        self._checks, self._on_progress, self._began = checks, on_progress, began
-        self.validating_s = 0.0
+        self._order, self._checks, self._path = order, checks, path
+        self._on_progress = on_progress
+        self.average = WeightAverage(order.preset.average_share)
+        self.curve: list[Point] = []
+        self.best: dict[str, Any] = {}
+        self._began = time.perf_counter()
 
-    def _on_rollout_start(self) -> None:
-        if self.num_timesteps >= self._next:
-            self._validate()
-        self._on_progress(self.num_timesteps, None)
+    def resume(self, model: BaseAlgorithm) -> None:
+        """Put the training where its checkpoint was, if there is one."""
+        if not self._path.exists():
+            return
+        loaded = load_checkpoint(self._path, model, self._to_json())
+        self.curve, self.best, self.average.weights = loaded
+        self._began -= self.curve[-1].wall_s
+        # What comes now is drawn anew, not as it was at the beginning.
+        model.set_random_seed(self._order.seed + model.num_timesteps)
 
-    @property
-    def _next(self) -> float:
-        done = self._course.curve[-1].steps if self._course.curve else -1
-        return done + self._order.preset.steps / EVALUATIONS if done >= 0 else 0
+    def _to_json(self) -> dict[str, Any]:
+        """All that moves the result."""
+        order = self._order
+        return {**asdict(order.preset), "seed": order.seed, "threads": order.threads}
 
     def _on_step(self) -> bool:
-        return not self._course.stopped
+        return True
 
-    def validate_at_end(self) -> None:
-        """A leg ends with a validation, unless it has just had one."""
-        curve = self._course.curve
-        if self._course.stopped:
-            return
-        if not curve or self.model.num_timesteps > curve[-1].steps:
+    def _on_rollout_start(self) -> None:
+        share = self._order.preset.n_timesteps / EVALUATIONS
+        if not self.curve or self.model.num_timesteps >= self.curve[-1].steps + share:
+            self._validate()
+        self._on_progress(self.model.num_timesteps, None)
+
+    def _on_training_end(self) -> None:
+        if self.model.num_timesteps > self.curve[-1].steps:
             self._validate()
 
     def _validate(self) -> None:
-        started = time.perf_counter()
-        with averaged(self.model, self._average):
-            validation = validate(self.model, self._checks, self._order.preset.task)
-        self.validating_s += time.perf_counter() - started
-        wall = self._course.wall_s + time.perf_counter() - self._began
-        point = Point(self.model.num_timesteps, round(wall, 3), *validation)
-        curve = self._course.curve
-        curve.append(point)
-        errors = [one.error for one in curve]
-        best = min(range(len(errors)), key=lambda i: (errors[i] > WORTH * min(errors), i))
-        patience = self._order.patience
-        self._course.stopped = bool(patience) and len(errors) - 1 - best >= patience
+        with self.average.applied():
+            wall_s = round(time.perf_counter() - self._began, 3)
+            point = validate(self.model, self._checks, self._order.preset.task, wall_s)
+            if all(point.mean < earlier.mean for earlier in self.curve):
+                self.best = copy.deepcopy(self.model.policy.state_dict())
+        self.curve.append(point)
+        content = {"order": self._to_json(), "curve": self.curve}
+        tensors = {"best": self.best, "average": self.average.weights}
+        save_checkpoint(self._path, self.model, content, tensors)
         self._on_progress(point.steps, point)

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 
@@ -45,10 +46,14 @@ class Stations:
         self.first, self.count = first, count
 
     @property
-    def structure(self) -> Model:
-        """The nominal model with every effect that a station may have, neutral."""
-        model = load_model(self.recipe.model)
-        return model.with_effects({effect.name: {} for effect in self.recipe.effects})
+    def options(self) -> dict[str, Any]:
+        """Options of an environment whose episodes are on them.
+
+        Its model is the nominal one with every effect that a station may have, neutral.
+        """
+        effects = {effect.name: {} for effect in self.recipe.effects}
+        model = load_model(self.recipe.model).with_effects(effects)
+        return {"randomisation": self, "model": model}
 
     def __call__(self, nominal: Model, generator: np.random.Generator) -> Model:
         """The station of an episode."""

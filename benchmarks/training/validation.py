@@ -1,22 +1,26 @@
 """Validation error of a policy on stations that it was not trained on."""
 
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from stable_baselines3.common.vec_env import VecEnv
 
 from benchmarks.report.errors import Measure, measures, task_of
 from benchmarks.report.statistics import interquartile_mean
 from pma_gym.units import SI_FACTORS
 
+if TYPE_CHECKING:
+    from stable_baselines3.common.vec_env import VecEnv
+
 SEED = 4_000_000
 """Seed of the first validation episode."""
 
 
-class Validation(NamedTuple):
-    """Errors over validation episodes, in the task's unit.
+class Point(NamedTuple):
+    """A validation on the learning curve; errors over its episodes in the task's unit.
 
     Attributes:
+        steps: control steps so far.
+        wall_s: wall time so far, validations included (s).
         error: interquartile mean of the RMSE (mm or deg), of the phases that the suites' first
             measure of the task has: in rotation I and II.
         broken: how many episodes broke a physical limit; such a one has the error of the range.
@@ -24,6 +28,8 @@ class Validation(NamedTuple):
         mean: mean of the RMSE of all episodes: one station that is lost shows here, not in `error`.
     """
 
+    steps: int
+    wall_s: float
     error: float
     broken: int
     reward: float
@@ -38,13 +44,19 @@ def measure_of(task: str) -> Measure:
     return measures([task])[0]
 
 
-def validate(model: Any, envs: VecEnv, task: str) -> Validation:  # noqa: ANN401
+def validate(
+    model: Any,  # noqa: ANN401
+    envs: "VecEnv",
+    task: str,
+    wall_s: float,
+) -> Point:
     """Let a policy drive one episode in every environment, without exploring.
 
     Args:
-        model: with `predict(observations, deterministic=True)`, as Stable-Baselines3 has it.
+        model: of Stable-Baselines3.
         envs: as `validation_environments` makes them.
         task: name of the task.
+        wall_s: wall time so far (s).
     """
     envs.seed(SEED)
     observations: Any = envs.reset()
@@ -60,9 +72,8 @@ def validate(model: Any, envs: VecEnv, task: str) -> Validation:  # noqa: ANN401
             failed = not infos[i]["TimeLimit.truncated"]
             broken += failed
             errors[i] = measure.of_row(_row(task, infos[i], failed))
-    return Validation(
-        float(interquartile_mean(errors)), broken, float(rewards.mean()), float(errors.mean())
-    )
+    error, mean = float(interquartile_mean(errors)), float(errors.mean())
+    return Point(model.num_timesteps, wall_s, error, broken, float(rewards.mean()), mean)
 
 
 def _row(task: str, info: dict[str, Any], failed: bool) -> dict[str, Any]:

@@ -7,7 +7,7 @@ import numpy as np
 import onnx
 from onnx.reference import ReferenceEvaluator
 
-from benchmarks.training.policy_export.onnx_file import write_onnx
+from benchmarks.training.onnx_file import write_onnx
 from controllers.policies.policy_file import load_policy_file
 from controllers.policy import POLICIES
 

@@ -20,7 +20,7 @@ PRESSURES = np.array([150e3, 300e3, 500e3, 300e3])
 def drawn():
     stations = Stations("robust", 0, 3)
     models = [stations.of(0), stations.of(1), stations.of(2), stations.of(1)]
-    return Plant(stations.structure), models
+    return Plant(stations.options["model"]), models
 
 
 @pytest.fixture(autouse=True)
@@ -77,7 +77,7 @@ def test_what_does_not_balance_is_named(drawn):
 
 def test_episodes_do_not_tell_whether_a_rest_was_kept():
     stations = Stations("robust", 0, 2)
-    options = {"randomisation": stations, "model": stations.structure}
+    options = stations.options
     envs = PMAVectorEnv(4, "displacement", pressure_kpa=[150.0, 300.0], **options)
     first, _ = envs.reset(seed=3)
     again, _ = envs.reset(seed=3)

@@ -154,7 +154,7 @@ def test_stable_baselines_records_a_film_of_a_batch(films, tmp_path):
     pytest.importorskip("stable_baselines3")
     from stable_baselines3.common.vec_env import VecNormalize, VecVideoRecorder
 
-    from pma_gym.sb3.vec_env import SB3VecEnv
+    from pma_gym.sb3 import SB3VecEnv
 
     inner = VecNormalize(SB3VecEnv(4, control_rate_hz=10.0, **MADE))
     envs = VecVideoRecorder(inner, str(tmp_path), lambda step: step == 0, video_length=6)

@@ -93,7 +93,7 @@ def test_batches_give_the_bits_of_single_environments(twins, fragile, mode, func
 
 
 def test_threads_and_sb3_have_the_same_rewards():
-    sb3 = pytest.importorskip("pma_gym.sb3.vec_env")
+    sb3 = pytest.importorskip("pma_gym.sb3")
     made = {**MADE, "reward": smooth, "reward_scale": 0.25}
     first, other = PMAVectorEnv(20, threads=2, **made), sb3.SB3VecEnv(20, **made)
     first.reset(seed=1)

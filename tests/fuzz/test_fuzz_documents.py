@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 from benchmarks.runner.journal import case_rows
 from benchmarks.suites.frozen import parse_suite
-from benchmarks.training.configuration.preset import PresetError, load_preset
+from benchmarks.training.preset import PresetError, load_preset
 from controllers.policies.document import PolicyError, parsed_document
 from controllers.policies.tensors import check_header
 from pma_gym.data.datasets.dataset_toml import read_description

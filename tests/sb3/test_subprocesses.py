@@ -12,7 +12,7 @@ from stable_baselines3.common.vec_env import SubprocVecEnv
 
 from pma_gym.envs import PMAEnv
 from pma_gym.plant.plant import Plant
-from pma_gym.sb3.vec_env import SB3VecEnv
+from pma_gym.sb3 import SB3VecEnv
 
 
 def make() -> PMAEnv:

@@ -1,4 +1,5 @@
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -8,10 +9,8 @@ pytest.importorskip("safetensors")
 
 import torch
 
-from benchmarks.training import environments
-from benchmarks.training.configuration.preset import Preset
-from controllers.policies.adapter import ActionMapping
-from controllers.policies.observation_spec import ObservationSpec
+from benchmarks.training import policy_batch
+from benchmarks.training.preset import Preset
 
 SMALL = {
     "ppo": {"n_steps": 32, "batch_size": 32, "n_epochs": 2, "learning_rate": "lin_0.003"},
@@ -20,6 +19,8 @@ SMALL = {
     "tqc": {"learning_starts": 64, "buffer_size": 1200, "batch_size": 16, "ent_coef": "auto_0.01"},
 }
 """Settings of a training of no consequence."""
+
+SLOW = {"control_rate_hz": 10.0, "pressure_kpa": 300.0}
 
 
 @pytest.fixture(autouse=True)
@@ -33,25 +34,27 @@ def one_thread() -> Iterator[None]:
 
 @pytest.fixture
 def preset(monkeypatch) -> Callable[..., Preset]:
-    """A preset of two legs of a second each, on the nominal station, validated on two episodes."""
-    monkeypatch.setattr(environments, "VALIDATION", 1)
+    """A small preset on the nominal station, validated on two episodes."""
+    monkeypatch.setattr(policy_batch, "VALIDATION", 1)
 
-    def made(algorithm: str = "ppo", **fields: Any) -> Preset:
+    def made(algorithm: str = "ppo", options: Mapping[str, Any] = SLOW, **fields: Any) -> Preset:
+        wrapper = {
+            "view": {"kind": "tracking", "preview": 2, "history": 2},
+            "form": {"kind": "increment", "authority_v": 0.5},
+            "options": options,
+            "reward_scale": 0.1,
+        }
         small = Preset(
             name="small",
             algorithm=algorithm,
             environment="pma_gym/IsokineticDisplacement-v0",
-            view=ObservationSpec("tracking", 2, 2),
-            form=ActionMapping("increment", 0.5),
-            stations="",
-            options={"control_rate_hz": 10.0, "pressure_kpa": 300.0},
-            environments=4,
-            steps=960,
+            wrapper=wrapper,
+            n_envs=4,
+            n_timesteps=512,
             average_share=0.5,
-            settings=SMALL[algorithm],
-            network={"net_arch": [16]},
             noise_std=0.1 if algorithm == "td3" else 0.0,
+            settings=SMALL[algorithm] | {"policy_kwargs": {"net_arch": [16]}},
         )
-        return small.changed(**fields)
+        return replace(small, **fields)
 
     return made

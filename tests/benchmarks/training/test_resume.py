@@ -1,12 +1,10 @@
-"""A training that was interrupted goes on to what it would have come to, or says why not."""
+"""A training that was interrupted goes on, keeps its best weights, or says why not."""
 
 import base64
 import errno
-import hashlib
 import io
 import json
 import os
-import resource
 import shutil
 import subprocess
 import sys
@@ -20,57 +18,29 @@ pytest.importorskip("safetensors")
 
 import cloudpickle
 import torch
-from stable_baselines3.common.save_util import load_from_zip_file
 
 from benchmarks.training import checkpoint, run
-from benchmarks.training.averaging import WeightAverage
-from benchmarks.training.checkpoint import CheckpointError, save_checkpoint
-from benchmarks.training.learner import learner
+from benchmarks.training.checkpoint import CheckpointError
 from benchmarks.training.run import Order, train
 
 
-@pytest.fixture(autouse=True)
-def short_legs(monkeypatch):
-    """Legs of two episodes and two validations: what is tested is where they meet."""
-    monkeypatch.setattr(run, "EPISODES", 2)
-    monkeypatch.setattr(run, "EVALUATIONS", 2)
+def interrupted(order, out, after):
+    """Train until so many control steps, then Ctrl-C."""
 
+    def stop(steps, point):
+        if steps >= after and point is not None:
+            raise KeyboardInterrupt
 
-class Killed(BaseException):
-    """Stands for a kill: nothing catches it."""
-
-
-def killed_after(legs, monkeypatch, order, out):
-    """Train until so many checkpoints are saved."""
-
-    def saved(folder, number, *given):
-        save_checkpoint(folder, number, *given)
-        if number == legs:
-            raise Killed
-
-    with monkeypatch.context() as patched:
-        patched.setattr(run, "save_checkpoint", saved)
-        with pytest.raises(Killed):
-            trained(order, out)
+    with pytest.raises(KeyboardInterrupt):
+        train(order, out, stop)
 
 
 def trained(order, out):
-    """Train."""
     return train(order, out, lambda steps, point: None)
 
 
 def weights(model):
     return {name: tensor.clone() for name, tensor in model.policy.state_dict().items()}
-
-
-def flat(content):
-    """All numbers of parameters, optimisers' states and variables."""
-    if torch.is_tensor(content):
-        return content.reshape(-1).double()
-    if isinstance(content, dict):
-        content = [content[key] for key in sorted(content, key=str)]
-    parts = [flat(one) for one in content] if isinstance(content, list | tuple) else []
-    return torch.cat(parts) if parts else torch.zeros(0, dtype=torch.float64)
 
 
 def same(one, other):
@@ -80,122 +50,91 @@ def same(one, other):
 
 @pytest.fixture(scope="module")
 def kept():
-    """Trainings that several tests begin from."""
     return {}
 
 
 @pytest.fixture
 def whole(kept, preset, tmp_path, tmp_path_factory):
-    """A folder with a copy of a finished training, its weights and its final score."""
-    if "whole" not in kept:
+    """A folder with a copy of a finished training, and what it came to."""
+    if not kept:
         folder = tmp_path_factory.mktemp("whole")
-        done = trained(Order(preset(), seed=3), folder)
-        kept["whole"] = folder, weights(done.model), done.final
-    folder, tensors, final = kept["whole"]
-    return shutil.copytree(folder, tmp_path / "whole"), tensors, final
-
-
-@pytest.fixture
-def killed(kept, preset, monkeypatch, tmp_path, tmp_path_factory):
-    """A folder with a copy of a training that was killed after its first leg."""
-    if "killed" not in kept:
-        kept["killed"] = tmp_path_factory.mktemp("killed")
-        killed_after(1, monkeypatch, Order(preset(), seed=3), kept["killed"])
-    return shutil.copytree(kept["killed"], tmp_path / "killed")
+        kept["whole"] = folder, trained(Order(preset(), seed=3), folder)
+    folder, done = kept["whole"]
+    return shutil.copytree(folder, tmp_path / "whole"), done
 
 
 @pytest.mark.parametrize("algorithm", ["ppo", "sac", "td3", "tqc"])
-def test_a_killed_training_comes_to_the_same_policy(algorithm, preset, monkeypatch, tmp_path):
+def test_an_interrupted_training_goes_on_from_its_checkpoint(algorithm, preset, tmp_path):
     order = Order(preset(algorithm), seed=3)
-    whole = trained(order, tmp_path / "whole")
-    assert whole.course.legs == 2
-    killed_after(1, monkeypatch, order, tmp_path / "killed")
-    resumed = trained(order, tmp_path / "killed")
-    assert same(weights(whole.model), weights(resumed.model))
-    assert whole.final == resumed.final
-    assert [p._replace(wall_s=0.0) for p in whole.course.curve] == [
-        p._replace(wall_s=0.0) for p in resumed.course.curve
-    ]
-    ours, theirs = (
-        load_from_zip_file(tmp_path / name / "checkpoints/000002/model.zip", load_data=False)
-        for name in ("whole", "killed")
-    )
-    assert torch.equal(flat(ours), flat(theirs))
+    interrupted(order, tmp_path, 256)
+    before = (tmp_path / "checkpoint.zip").read_bytes()
+    resumed = []
+    done = train(order, tmp_path, lambda steps, point: resumed.append(steps))
+    assert min(resumed) >= 256 and done.model.num_timesteps >= 512
+    steps = [point.steps for point in done.curve]
+    assert steps == sorted(set(steps)) and steps[0] == 0 and min(resumed) in steps
+    assert done.best.mean == min(point.mean for point in done.curve)
+    if algorithm != "ppo":
+        # What it replays from the second half comes after what it had.
+        assert done.model.replay_buffer.pos * 4 == done.model.num_timesteps
+        assert done.model.replay_buffer.rewards[:64].any()
+    assert (tmp_path / "checkpoint.zip").read_bytes() != before
 
 
 def test_a_finished_training_run_again_trains_nothing(whole, preset, monkeypatch):
-    folder, tensors, final = whole
-
-    def leg(*_):
-        raise AssertionError("there is nothing to train")
-
-    monkeypatch.setattr(run, "_leg", leg)
+    folder, done = whole
+    monkeypatch.setattr(run, "validate", lambda *_: pytest.fail("there is nothing to train"))
     again = trained(Order(preset(), seed=3), folder)
-    assert same(tensors, weights(again.model)) and final == again.final
+    assert same(weights(done.model), weights(again.model)) and done.best == again.best
 
 
-def test_the_same_seed_gives_the_same_policy_and_another_one_another(preset, tmp_path):
-    one, other, third = (
-        weights(trained(Order(preset(steps=480), seed), tmp_path / name).model)
-        for name, seed in (("a", 3), ("b", 3), ("c", 4))
+def test_the_weights_are_those_of_the_best_validation(preset, tmp_path, monkeypatch):
+    errors, seen = iter([3.0, 1.0, *[2.0] * 20]), []
+
+    def validate(model, envs, task, wall_s):
+        seen.append(weights(model))
+        return run.Point(model.num_timesteps, wall_s, 0.0, 0, 0.0, next(errors))
+
+    monkeypatch.setattr(run, "validate", validate)
+    done = trained(Order(preset(), seed=3), tmp_path)
+    assert same(weights(done.model), seen[1]) and not same(seen[1], seen[-1])
+    assert done.best == done.curve[1]
+
+
+def test_the_same_seed_gives_the_same_policy_in_any_process_and_another_one_another(
+    whole, preset, tmp_path
+):
+    _, done = whole
+    there = tmp_path / "there"
+    order = cloudpickle.dumps(Order(preset(), seed=3))
+    # Another hash seed: no order of a set may matter.
+    subprocess.run(
+        [sys.executable, "-c", PROCESS, str(there)],
+        input=order,
+        check=True,
+        env=os.environ | {"PYTHONHASHSEED": "1", "PYTHONPATH": os.pathsep.join(sys.path)},
     )
-    assert same(one, other) and not same(one, third)
+    assert same(weights(done.model), weights(trained(Order(preset(), seed=3), there).model))
+    other = trained(Order(preset(), seed=4), tmp_path / "other")
+    assert not same(weights(done.model), weights(other.model))
 
 
 PROCESS = """
-import hashlib, sys, pathlib
-from benchmarks.training import environments, run
-from benchmarks.training.configuration.preset import Preset
-from controllers.policies.adapter import ActionMapping
-from controllers.policies.observation_spec import ObservationSpec
-environments.VALIDATION = 1
-preset = Preset("small", "ppo", "pma_gym/IsokineticDisplacement-v0", ObservationSpec("tracking", 2,
-2),
-    ActionMapping("increment", 0.5), "", {"control_rate_hz": 10.0, "pressure_kpa": 300.0}, 4, 480,
-    0.5, {"n_steps": 32, "batch_size": 32, "n_epochs": 2, "learning_rate": "lin_0.003"},
-    {"net_arch": [16]})
-run.EPISODES = run.EVALUATIONS = 2
-trained = run.train(run.Order(preset, 3), pathlib.Path(sys.argv[1]), lambda steps, point: None)
-sums = hashlib.sha256()
-for tensor in trained.model.policy.state_dict().values():
-    sums.update(tensor.numpy().tobytes())
-print(sums.hexdigest())
+import pathlib, pickle, sys
+from benchmarks.training import policy_batch, run
+policy_batch.VALIDATION = 1
+run.train(pickle.load(sys.stdin.buffer), pathlib.Path(sys.argv[1]), lambda steps, point: None)
 """
-
-
-def test_another_process_gives_the_same_policy(preset, tmp_path):
-    # Another hash seed: no order of a set may matter.
-    process = subprocess.run(
-        [sys.executable, "-c", PROCESS, str(tmp_path / "there")],
-        stdout=subprocess.PIPE,
-        check=True,
-        text=True,
-        env=os.environ | {"PYTHONHASHSEED": "1", "PYTHONPATH": os.pathsep.join(sys.path)},
-    )
-    sums = hashlib.sha256()
-    for tensor in weights(trained(Order(preset(steps=480), 3), tmp_path / "here").model).values():
-        sums.update(tensor.numpy().tobytes())
-    assert process.stdout.strip() == sums.hexdigest()
 
 
 # -- refused ---------------------------------------------------------------------------------------
 
 
-def test_another_order_in_the_folder_is_refused(killed, preset):
+def test_another_order_in_the_folder_is_refused(whole, preset):
     with pytest.raises(CheckpointError, match=r"another training: seed was 3, is 4; give another"):
-        trained(Order(preset(), seed=4), killed)
-    with pytest.raises(CheckpointError, match=r"steps was 960, is 1920"):
-        trained(Order(preset(steps=1920), seed=3), killed)
-
-
-def executes(content):
-    """A zip with pickled data of Stable-Baselines3's kind, which runs code when it is loaded."""
-    pickled = base64.b64encode(cloudpickle.dumps(Runs())).decode()
-    data = json.dumps({"policy_class": {":type:": "", ":serialized:": pickled}})
-    made = io.BytesIO(content)
-    with zipfile.ZipFile(made, "a") as archive:
-        archive.writestr("data", data)
-    return made.getvalue()
+        trained(Order(preset(), seed=4), whole[0])
+    with pytest.raises(CheckpointError, match=r"n_timesteps was 512, is 1024"):
+        trained(Order(preset(n_timesteps=1024), seed=3), whole[0])
 
 
 class Runs:
@@ -203,74 +142,60 @@ class Runs:
         return exec, ("raise SystemExit('it ran')",)
 
 
-DAMAGE = {
-    "cut tensors": ("model.zip", lambda content: content[: len(content) // 2]),
-    "no tensors": ("model.zip", lambda content: b""),
-    "pickled tensors": ("model.zip", lambda content: pickled_weights()),
-    "cut words": ("state.json", lambda content: content[: len(content) // 2]),
-    "other words": ("state.json", lambda content: b"[1, 2]"),
-    "no course": ("state.json", lambda content: content.replace(b'"curve"', b'"curved"')),
-}
-
-
-def pickled_weights():
-    weights, made = io.BytesIO(), io.BytesIO()
-    torch.save({"weight": Runs()}, weights)
-    with zipfile.ZipFile(made, "w") as archive:
-        archive.writestr("policy.pth", weights.getvalue())
+def rewritten(content, name, change):
+    """A zip with another content of one file."""
+    made = io.BytesIO()
+    with zipfile.ZipFile(io.BytesIO(content)) as old, zipfile.ZipFile(made, "w") as new:
+        for each in old.namelist():
+            new.writestr(each, change(old.read(each)) if each == name else old.read(each))
     return made.getvalue()
 
 
+def pickled(_):
+    made = io.BytesIO()
+    torch.save({"weight": Runs()}, made)
+    return made.getvalue()
+
+
+DAMAGE = {
+    "cut": lambda content: content[: len(content) // 2],
+    "empty": lambda content: b"",
+    "pickled tensors": lambda content: rewritten(content, "policy.pth", pickled),
+    "other data": lambda content: rewritten(content, "data", lambda _: b"[1, 2]"),
+    "no curve": lambda content: rewritten(content, "data", lambda d: d.replace(b"curve", b"x")),
+}
+
+
 @pytest.mark.parametrize("damage", DAMAGE)
-def test_a_damaged_checkpoint_is_named_and_the_one_before_serves(damage, whole, preset, capsys):
-    folder, tensors, _ = whole
-    name, harm = DAMAGE[damage]
-    last = folder / "checkpoints" / "000002"
-    (last / name).write_bytes(harm((last / name).read_bytes()))
-    (folder / "checkpoints" / "000002 of monday").mkdir()
-    assert same(tensors, weights(trained(Order(preset(), seed=3), folder).model))
-    said = [line for line in capsys.readouterr().err.splitlines() if line.startswith("warning: ")]
-    assert len(said) == 1 and "000002 is damaged" in said[0]
+def test_a_damaged_checkpoint_is_named(damage, whole, preset):
+    path = whole[0] / "checkpoint.zip"
+    path.write_bytes(DAMAGE[damage](path.read_bytes()))
+    with pytest.raises(CheckpointError, match=r"checkpoint.zip is damaged .*; delete it to train"):
+        trained(Order(preset(), seed=3), whole[0])
 
 
 def test_nothing_in_a_checkpoint_executes(whole, preset):
-    folder, tensors, _ = whole
-    path = folder / "checkpoints" / "000002" / "model.zip"
-    path.write_bytes(executes(path.read_bytes()))
-    assert same(tensors, weights(trained(Order(preset(), seed=3), folder).model))
+    folder, done = whole
+    path = folder / "checkpoint.zip"
+    code = base64.b64encode(cloudpickle.dumps(Runs())).decode()
+    words = {"policy_class": {":type:": "", ":serialized:": code}}
+    content = rewritten(
+        path.read_bytes(), "data", lambda data: json.dumps(json.loads(data) | words).encode()
+    )
+    path.write_bytes(content)
+    assert same(weights(done.model), weights(trained(Order(preset(), seed=3), folder).model))
 
 
-# -- a full disk -----------------------------------------------------------------------------------
-
-
-def _full(*_, **__):
-    raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-
-
-@pytest.mark.parametrize("what", ["save_to_zip_file", "json"])
-def test_a_full_disk_leaves_the_last_checkpoint(what, whole, killed, preset, monkeypatch):
+def test_a_full_disk_leaves_the_last_checkpoint(preset, monkeypatch, tmp_path):
     order = Order(preset(), seed=3)
-    with monkeypatch.context() as patched:
-        if what == "json":
-            patched.setattr("pathlib.Path.write_text", _full)
-        else:
-            patched.setattr(checkpoint, what, _full)
-        with pytest.raises(CheckpointError, match=r"No space left.*before it stay; make room"):
-            trained(order, killed)
-    assert [p.name for p in (killed / "checkpoints").iterdir()] == ["000001"]
-    assert same(whole[1], weights(trained(order, killed).model))
+    interrupted(order, tmp_path, 256)
+    before = (tmp_path / "checkpoint.zip").read_bytes()
 
+    def full(*_):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
-def test_a_file_that_may_not_grow_is_told(preset, tmp_path):
-    small = preset()
-    envs = run.training_environments(small)
-    model = learner(small, envs, 0)
-    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (1000, hard))
-    try:
-        with pytest.raises(CheckpointError, match=r"checkpoint 1 cannot be saved "):
-            save_checkpoint(tmp_path, 1, model, WeightAverage(0.1, 960), {})
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
-        envs.close()
-    assert not list(tmp_path.iterdir())
+    monkeypatch.setattr(checkpoint, "save_to_zip_file", full)
+    with pytest.raises(CheckpointError, match=r"No space left.*before it stays; make room"):
+        trained(order, tmp_path)
+    assert (tmp_path / "checkpoint.zip").read_bytes() == before
+    assert not list(tmp_path.glob(".*partial"))

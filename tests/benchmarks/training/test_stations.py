@@ -64,7 +64,7 @@ def test_a_suite_without_stations_is_refused():
 
 def test_episodes_are_on_drawn_stations_with_an_operator():
     drawn = Stations("robust", 0, 2)
-    given = {"randomisation": drawn, "model": drawn.structure, "pressure_kpa": 300.0}
+    given = drawn.options | {"pressure_kpa": 300.0}
     envs = PMAVectorEnv(6, "displacement", disturbances="regulator_and_hand_push", **given)
     envs.reset(seed=1)
     names = {model.name for model in envs.engine.models}

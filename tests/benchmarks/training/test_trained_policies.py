@@ -8,7 +8,7 @@ from benchmarks.runner.controller_spec import ControllerError, parse_controllers
 from benchmarks.suites.frozen import frozen_suite
 from benchmarks.training import card
 from benchmarks.training.card import save_policy, train_words
-from benchmarks.training.configuration.preset import load_preset
+from benchmarks.training.preset import load_preset
 from controllers.policies.policy_file import load_policy_file, save_policy_file
 from controllers.policy import shipped_policies
 from pma_gym.envs import PMAEnv
@@ -50,7 +50,8 @@ def test_what_ships_is_trained_again_by_its_cards_command():
         assert f"# {policy.name}\n" in card.card(policy)
         training = policy.training
         preset = load_preset(training["preset"], training["algorithm"], policy.environment["id"])
-        assert (preset.view, preset.form) == (policy.view, policy.form)
+        adapter = preset.env.adapter
+        assert (adapter.view, adapter.form) == (policy.view, policy.form)
 
 
 def test_a_policy_file_and_a_folder_are_contenders(station, tmp_path):

@@ -1,4 +1,4 @@
-"""Many piloted environments are one of them, as often as there are, bit for bit."""
+"""Many environments behind a view and a form are one of them, many times, bit for bit."""
 
 import numpy as np
 import pytest
@@ -6,11 +6,14 @@ import pytest
 pytest.importorskip("stable_baselines3")
 
 import gymnasium as gym
+from stable_baselines3.common.monitor import Monitor
 
-from benchmarks.training.policy_batch import PilotedVecEnv
-from benchmarks.training.policy_env import PilotedEnv
+from benchmarks.training.policy_batch import PolicyVecEnv
+from benchmarks.training.policy_env import BROKEN_REWARD, LEAST_REWARD, PolicyEnv, bounded
+from benchmarks.training.preset import load_preset
 from controllers.policies.adapter import ActionMapping
 from controllers.policies.observation_spec import ObservationSpec
+from pma_gym.envs import PMAEnv
 from pma_gym.plant.model import load_model
 
 DISPLACEMENT = "pma_gym/IsokineticDisplacement-v0"
@@ -35,12 +38,12 @@ CASES = {
 
 def batch(view, form, options, task="displacement", **more):
     nominal = options.get("model", "station")
-    return PilotedVecEnv(COUNT, task, view, form, nominal, **more, **options)
+    return PolicyVecEnv(COUNT, task, view, form, nominal, **more, **options)
 
 
 def single(view, form, options, name=DISPLACEMENT):
     form = {key: value for key, value in form.to_json().items() if value is not None}
-    return PilotedEnv(gym.make(name), view.to_json(), form, options=options)
+    return PolicyEnv(gym.make(name), view.to_json(), form, options=options)
 
 
 @pytest.mark.parametrize("case", CASES)
@@ -69,16 +72,42 @@ def test_the_batch_is_the_one_environment(case):
     envs.close()
 
 
-def test_rotation_too():
-    view, form, options = CASES["increment"]
-    envs = batch(view, form, options, "rotation")
-    one = single(view, form, options, "pma_gym/IsokineticRotation-v0")
+@pytest.mark.parametrize(
+    ("task", "pressures"),
+    [
+        ("rotation", [200.0, 300.0, 400.0]),
+        ("isokinetic_exercise", [300.0, 400.0, 550.0]),
+        ("profile_exercise", [460.0, 540.0]),
+    ],
+)
+def test_the_batch_of_every_task_is_the_one_environment(task, pressures):
+    view, form, _ = CASES["increment"]
+    options = {"control_rate_hz": 50.0, "pressure_kpa": pressures}
+    envs = batch(view, form, options, task, reward_scale=0.1)
+    given = {"kind": "increment", "authority_v": 0.5}
+    singles = [
+        PolicyEnv(PMAEnv(task), view.to_json(), given, options=options, reward_scale=0.1)
+        for _ in range(COUNT)
+    ]
+    actions = np.random.default_rng(1).uniform(-1.2, 1.2, (60, COUNT, 1)).astype(np.float32)
     envs.seed(5)
-    np.testing.assert_array_equal(envs.reset()[0], one.reset(seed=5)[0])
-    for action in np.linspace(-0.3, 1.0, 30, dtype=np.float32):
-        seen = envs.step(np.full((COUNT, 1), action))[0]
-        np.testing.assert_array_equal(seen[0], one.step(np.array([action]))[0])
+    seen = envs.reset()
+    np.testing.assert_array_equal(seen, [one.reset(seed=5 + i)[0] for i, one in enumerate(singles)])
+    for given_now in actions:
+        seen, rewards, over, _ = envs.step(given_now)
+        assert not over.any()
+        for i, one in enumerate(singles):
+            entries, reward, *_ = one.step(given_now[i])
+            assert np.float32(reward) == rewards[i]
+            np.testing.assert_array_equal(seen[i], entries)
     envs.close()
+
+
+def test_rewards_are_bounded_before_they_are_scaled():
+    rewards = np.array([-0.5, -30.0, -30.0])
+    limited = bounded(rewards, np.array([False, False, True]), 0.01)
+    np.testing.assert_allclose(limited, [-0.005, 0.01 * LEAST_REWARD, 0.01 * -30.0])
+    assert bounded(-1e4, True) == BROKEN_REWARD
 
 
 # -- staggered -------------------------------------------------------------------------------------
@@ -131,7 +160,7 @@ def test_a_cut_trials_last_view_is_its_own():
 
 def test_a_broken_limit_is_no_time_limit():
     fragile = load_model("serres2008").replace({"limits.tension_n": 300.0})
-    envs = PilotedVecEnv(
+    envs = PolicyVecEnv(
         COUNT, "displacement", ObservationSpec("tracking", 1, 1), ActionMapping("direct", 5.0),
         "serres2008", model=fragile, pressure_kpa=300.0, control_rate_hz=20.0,
     )  # fmt: skip
@@ -159,4 +188,28 @@ def test_an_action_that_is_no_number_is_refused():
 
 def test_a_view_of_its_own_needs_an_environment_of_ours():
     with pytest.raises(TypeError, match="env must be one of pma_gym, got CartPole"):
-        PilotedEnv(gym.make("CartPole-v1"), view={}, form={})
+        PolicyEnv(gym.make("CartPole-v1"), view={}, form={})
+
+
+# -- one environment -------------------------------------------------------------------------------
+
+
+# increment-late has options of its own: half the rate, so half the steps.
+@pytest.mark.parametrize(("preset", "steps"), [("increment", 501), ("increment-late", 251)])
+def test_wrappers_stay_around_the_environment_made_anew(preset, steps):
+    made = load_preset(preset, "ppo", DISPLACEMENT)
+    monitored = PolicyEnv(Monitor(gym.make(DISPLACEMENT)), **made.wrapper)
+    single = PolicyEnv(PMAEnv("displacement"), **made.wrapper)
+    assert monitored.unwrapped is monitored.rig
+    first, _ = monitored.reset(seed=3)
+    assert np.array_equal(first, single.reset(seed=3)[0])
+    rng, total, ended = np.random.default_rng(1), 0.0, False
+    while not ended:
+        action = rng.uniform(-1.0, 1.0, 1).astype(np.float32)
+        seen, reward, terminated, truncated, info = monitored.step(action)
+        same, *others = single.step(action)
+        assert np.array_equal(seen, same) and others[:3] == [reward, terminated, truncated]
+        total, ended = total + reward, terminated or truncated
+    assert info["episode"]["l"] == steps
+    # The wrapper inside sees the environment's own rewards, which are not bounded.
+    assert info["episode"]["r"] < total

@@ -1,4 +1,4 @@
-"""The batched environments for Stable-Baselines3."""
+"""Batched environments as Stable-Baselines3's VecEnv; needs the extra `rl`."""
 
 import time
 from collections.abc import Sequence
@@ -9,9 +9,6 @@ import numpy as np
 from gymnasium.envs.registration import EnvSpec
 from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
-from stable_baselines3.common.monitor import Monitor
-from stable_baselines3.common.vec_env import VecEnv
-from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices, VecEnvObs, VecEnvStepReturn
 
 from pma_gym.engine.option_checks import check_known, parse_pressure
 from pma_gym.envs.member import TOGETHER, BatchMember, refusal
@@ -19,6 +16,21 @@ from pma_gym.envs.registered import is_id, registered
 from pma_gym.envs.summary import last_info
 from pma_gym.envs.vector import PMAVectorEnv
 from pma_gym.tasks import Task
+
+try:
+    from stable_baselines3.common.monitor import Monitor
+    from stable_baselines3.common.vec_env import VecEnv
+    from stable_baselines3.common.vec_env.base_vec_env import (
+        VecEnvIndices,
+        VecEnvObs,
+        VecEnvStepReturn,
+    )
+except ModuleNotFoundError as error:
+    missing = str(error.name).partition(".")[0]
+    raise ModuleNotFoundError(
+        f'pma_gym.sb3 needs {missing}, which is not installed: pip install "pma-gym[rl]"',
+        name=missing,
+    ) from None
 
 
 class EngineVecEnv(VecEnv):

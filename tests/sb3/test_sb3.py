@@ -18,7 +18,7 @@ from stable_baselines3.common.vec_env import (
 )
 
 from pma_gym.envs import PMAEnv
-from pma_gym.sb3.vec_env import SB3VecEnv
+from pma_gym.sb3 import SB3VecEnv
 
 MADE = {"model": "serres2008", "pressure_kpa": 300, "control_rate_hz": 10.0}
 

@@ -1,1 +1,0 @@
-"""Presets: reading and checking them."""

@@ -1,1 +1,0 @@
-"""Policy files and ONNX files from trained models."""
