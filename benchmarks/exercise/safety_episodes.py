@@ -224,8 +224,7 @@ def measure(
 def _options(stations: str, safety: bool) -> Options:
     if stations == "varied":
         return Options(randomisation="varied", safety=safety)
-    drawn = Stations("robust", FIRST_STATION, STATIONS)
-    return Options(randomisation=drawn, model=drawn.structure, safety=safety)
+    return Options(safety=safety, **Stations("robust", FIRST_STATION, STATIONS).options)
 
 
 def _run(
