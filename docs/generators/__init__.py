@@ -31,8 +31,6 @@ from generators.exercise import (
 )
 from generators.files import calibrations, columns, raw_columns, tables
 from generators.hidden_effects import (
-    hidden_baselines,
-    hidden_bound,
     hidden_cases,
     hidden_confused,
     hidden_kinds,
@@ -62,7 +60,7 @@ GENERATORS: dict[str, Callable[..., str]] = {
         *(controllers, example, targets, trials, tuning),
         *(suites, episode_plans, occasional),
         *(hidden_rates, hidden_cases, hidden_sizes, hidden_rounds, hidden_misses),
-        *(hidden_baselines, hidden_bound, hidden_kinds, hidden_parameters, hidden_seconds),
+        *(hidden_kinds, hidden_parameters, hidden_seconds),
         *(hidden_confused, hidden_summary, hidden_measured),
         policies_shipped,
         *(exercise_check, exercise_worst, exercise_ranges, exercise_knee, exercise_makers),

@@ -4,9 +4,6 @@ import json
 from pathlib import Path
 from typing import Any
 
-from benchmarks.hidden_effects.baselines.comparison import COLUMNS
-from benchmarks.hidden_effects.baselines.registry import BASELINES
-from benchmarks.hidden_effects.bound import detected, identified
 from benchmarks.hidden_effects.evaluation.measured import measured_text
 from benchmarks.hidden_effects.evaluation.summary import diagnosis, measured_in, report_blocks
 from generators.text import code, table
@@ -119,60 +116,3 @@ def hidden_misses() -> str:
         for miss in block["misses"]
     ]
     return table(["Block", "Case", "Hidden", "r", "Said"], rows, (1, 3)) + "\n" + _measured()
-
-
-def hidden_baselines() -> str:
-    """The diagnosis, itself with one part off, and simpler baselines on the same cases."""
-    document = _read("baselines")
-    baselines = document["baselines"]
-    shown = [
-        name for name in COLUMNS if any(each["rates"][name]["n"] for each in baselines.values())
-    ]
-    rows = [
-        [BASELINES[baseline].title, *(_hits(each["rates"][name]) for name in shown), _seconds(each)]
-        for baseline, each in baselines.items()
-    ]
-    text = table(["Way", *shown, "s a case"], rows, range(1, len(shown) + 2))
-    return f"{text}\n\n{measured_text(document['measured'])}"
-
-
-def hidden_bound() -> str:
-    """How far effects are from nothing and from their nearest rival, and what that allows."""
-    every: dict[str, list[dict[str, Any]]] = {}
-    cases_read = _read("bound")["cases"]
-    for each in cases_read:
-        every.setdefault(each["effect"], []).append(each)
-    rows = [
-        [code(name), *(" / ".join(column) for column in zip(*map(_bound, some), strict=True))]
-        for name, cases in sorted(every.items())
-        for some in [sorted(cases, key=lambda each: each["r"])]
-    ]
-    header = ["Hidden", "r", "d to nothing", "detected (%)", "Nearest rival", "d to it", "told (%)"]
-    text = table(header, rows, range(1, 7))
-    return f"{text}\n\n{measured_text(each['measured'] for each in cases_read)}"
-
-
-def _bound(each: dict[str, Any]) -> list[str]:
-    """One case: r, what it is apart from, and what the ideal test makes of that."""
-    chances = (
-        100.0 * float(detected(each["nothing"])),
-        100.0 * float(identified(each["to_rival"])),
-    )
-    shown, known = (f"{chance:.0f}" for chance in chances)
-    rival = code(each["rival"])
-    return [
-        f"{each['r']:.2f}",
-        f"{each['nothing']:.0f}",
-        shown,
-        rival,
-        f"{each['to_rival']:.1f}",
-        known,
-    ]
-
-
-def _hits(figure: dict[str, Any]) -> str:
-    return f"{figure['hits']} of {figure['n']}" if figure["n"] else ""
-
-
-def _seconds(each: dict[str, Any]) -> str:
-    return "" if each["seconds"] is None else f"{each['seconds']:.1f}"
