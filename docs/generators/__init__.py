@@ -15,7 +15,6 @@ from generators.environments import (
     docstring,
     options,
     randomisations,
-    rewards,
     tasks,
 )
 from generators.equations import equations, ports, written
@@ -46,18 +45,18 @@ from generators.hidden_effects import (
 from generators.models import differences, identification, misfit, parameters, shipped
 from generators.policies import policies_shipped
 from generators.source import misprints, rates, verdicts, wrong_in_print
-from generators.suite import controllers, example, targets, trials, tuning
+from generators.suite import controllers, example, trials, tuning
 from generators.suites import episode_plans, occasional, suites
 
 GENERATORS: dict[str, Callable[..., str]] = {
     function.__name__: function
     for function in (
-        *(effects, overview, commands, docstring, options, randomisations, rewards),
+        *(effects, overview, commands, docstring, options, randomisations),
         *(disturbances, tasks),
         *(equations, ports, written, calibrations, columns, raw_columns, tables),
         *(differences, identification, misfit, parameters, shipped),
         *(misprints, rates, verdicts, wrong_in_print),
-        *(controllers, example, targets, trials, tuning),
+        *(controllers, example, trials, tuning),
         *(suites, episode_plans, occasional),
         *(hidden_rates, hidden_cases, hidden_sizes, hidden_rounds, hidden_misses),
         *(hidden_kinds, hidden_parameters, hidden_seconds),

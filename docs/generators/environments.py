@@ -2,9 +2,9 @@
 
 from dataclasses import MISSING, fields
 
-from generators.text import code, entries, sections, summary, table
+from generators.text import code, entries, sections, table
 from pma_gym.envs import Options, PMAEnv
-from pma_gym.tasks import DISTURBANCES, EVERY_TASK, PULSE_S, RANDOMISATIONS, REWARDS
+from pma_gym.tasks import DISTURBANCES, EVERY_TASK, PULSE_S, RANDOMISATIONS
 from pma_gym.units import SI_FACTORS
 
 
@@ -25,11 +25,6 @@ def options() -> str:
         for option in fields(Options)
     ]
     return table(["Option", "Default", "Meaning"], rows)
-
-
-def rewards() -> str:
-    """Rewards by name."""
-    return table(["Reward", "What"], [[code(n), summary(r)] for n, r in REWARDS.items()])
 
 
 def randomisations() -> str:

@@ -39,23 +39,3 @@ def trials() -> str:
         for task, pressures in load_suite().pressures_kpa.items()
     ]
     return table(["Task", "Trials", "Pressures (kPa)"], rows, right=(1,))
-
-
-def targets() -> str:
-    """What a run is measured by."""
-    wanted = load_suite().goals
-    simple = wanted.simple_prediction
-    feedback = " and ".join(code(name) for name in wanted.feedback)
-    rows = [
-        ["replay, displacement: mean absolute error of slope", f"< {simple['slope']} mm/s"],
-        ["replay, displacement: mean absolute error of intercept", f"< {simple['intercept']} mm"],
-        ["replay, displacement: mean absolute error of RMSE", f"< {simple['rmse']} mm"],
-        [f"{feedback}: displacement, largest RMSE", f"≤ {wanted.displacement_rmse_mm:g} mm"],
-        [f"{feedback}: rotation I and II", f"≤ {wanted.rotation_moving_rmse_deg:g} deg"],
-        [
-            f"{feedback}: rotation III, above the achievable bound",
-            f"≤ {wanted.return_above_bound_deg:g} deg",
-        ],
-        ["whole job", f"< {wanted.wall_time_s:g} s"],
-    ]
-    return table(["What", "Target"], rows)
