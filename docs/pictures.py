@@ -18,8 +18,7 @@ from rich.console import Console
 from trial_plots import controllers_plot, environment_plot, measured_plot, rig_plot
 
 import pma_gym  # noqa: F401 - registers the environments
-from benchmarks.exercise.choice import Choice
-from benchmarks.exercise.choose_device import run_exercise
+from benchmarks.exercise.choose_device import Choice, run_exercise
 from benchmarks.exercise.profile import read_profile
 from benchmarks.hidden_effects.evaluation.scoring import naming_picture
 from benchmarks.runner.rollout import make_environment, rollout

@@ -4,11 +4,11 @@ import json
 from pathlib import Path
 from typing import Any
 
-from benchmarks.exercise.choice import Choice
+from benchmarks.exercise.choose_device import Choice
 from benchmarks.exercise.safety_episodes import Safety
 from benchmarks.exercise.safety_layer import read_safety, safety_table, safety_text
 from benchmarks.exercise.tables import check_table, knee_table, makers_table, range_table
-from benchmarks.hidden_effects.evaluation.measured import measured_text
+from benchmarks.hidden_effects.evaluation.records import measured_text
 from benchmarks.hidden_effects.evaluation.summary import diagnosis, measured_in, report_blocks
 from controllers.policies.policy_file import load_policy_file
 from controllers.policy import shipped_policies
