@@ -21,7 +21,6 @@ NAMES = {"controllers": "pma_gym_controllers", "benchmarks": "pma_gym_benchmarks
 
 _OLD = "|".join(NAMES)
 _IMPORT = re.compile(rf"^(\s*(?:from|import)\s+)({_OLD})(?=[\s.,])", re.MULTILINE)
-_ALIASED = re.compile(rf"^(\s*import\s+)({_OLD})(\s+as\s)", re.MULTILINE)
 _BARE = re.compile(rf"^\s*import\s+({_OLD})(?:\.[\w.]+)?\s*$", re.MULTILINE)
 _PATH = re.compile(rf"(?<![\w./-])({_OLD})(?=(?:\.[a-z_]\w*|/[\w*]|:[A-Z]))")
 _PROGRAM = re.compile(r"(python -m )(benchmarks)\b")

@@ -82,23 +82,6 @@ class Regression:
     time_mean: float
     time_ss: float
 
-    @classmethod
-    def from_estimates(
-        cls, slope: float, intercept: float, ss_error: float, time: ArrayLike | None = None
-    ) -> "Regression":
-        """Reconstruct a regression from printed estimates.
-
-        Args:
-            slope: estimate of the slope (unit/s).
-            intercept: estimate of the intercept (unit).
-            ss_error: sum of squares of the error (unit^2).
-            time: the times that it was fitted on (s); one scored phase if not given.
-        """
-        times = phase_times() if time is None else np.asarray(time, dtype=float)
-        mean = float(np.mean(times))
-        spread = float(np.sum(np.square(times - mean)))
-        return cls(times.size, slope, intercept, ss_error, mean, spread)
-
     @property
     def error_dof(self) -> int:
         """Degrees of freedom of the error: n - 2."""

@@ -17,10 +17,10 @@ pwd.getpwuid = unknown
 
 CODE = """
 import pma_gym
-from pma_gym.codegen.cache.compile_cache import cache_directory
+from pma_gym.codegen.cache.compile_cache import _store
 from pma_gym.codegen.machine.native import Library
 Library("define double @one() { ret double 1.0 }")
-print(cache_directory())
+print(_store().folder.parent)
 """
 
 STEP = """

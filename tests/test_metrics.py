@@ -73,7 +73,9 @@ def test_percent_of_range_is_what_table_22_prints():
 def test_the_tables_follow_from_slope_intercept_and_error(trial):
     (slope, *slope_row, intercept, intercept_error, intercept_t), anova, printed = PRINTED[trial]
     ss_model, ss_error, f_ratio = anova
-    line = Regression.from_estimates(slope, intercept, ss_error)
+    times = phase_times()
+    spread = float(np.sum(np.square(times - times.mean())))
+    line = Regression(times.size, slope, intercept, ss_error, float(times.mean()), spread)
     assert line.error_dof == 1921
     assert_allclose([line.slope_std_error, line.slope_t_ratio], slope_row, rtol=2e-3)
     # The printed intercepts belong to times that begin one sample earlier: 1e-3 of the error.

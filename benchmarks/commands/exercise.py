@@ -49,8 +49,7 @@ def exercise(
     out: Annotated[Path, typer.Option(help="Folder of the report.")] = RESULTS / "exercise-device",
 ) -> None:
     """Show which moments muscles of which size give, and the smallest for a prescription."""
-    from benchmarks.exercise.choice import Choice, ChoiceError
-    from benchmarks.exercise.choose_device import run_exercise
+    from benchmarks.exercise.choose_device import Choice, ChoiceError, run_exercise
     from benchmarks.exercise.profile import ProfileError, held, read_profile
     from pma_gym.plant.exercise_device.prescription import UnreachableError
     from pma_gym.terminal import SafeConsole

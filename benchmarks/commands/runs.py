@@ -142,8 +142,8 @@ def report(
     ] = False,
 ) -> None:
     """Write a suite's page, its leaderboard, from the journal of its run."""
-    from benchmarks.comparison.command_lines import run_command
     from benchmarks.executors.choice import local
+    from benchmarks.report.leaderboard import run_command
     from benchmarks.report.publish import run_report
     from benchmarks.reproduction.reproduce import report_again
     from benchmarks.suites.frozen import frozen_suite
@@ -221,8 +221,8 @@ def remove(
     ] = RESULTS,
 ) -> None:
     """Take a controller's rows out of the journals; the rows of all others stay unchanged."""
-    from benchmarks.comparison.command_lines import report_command
     from benchmarks.comparison.job import remove_controller
+    from benchmarks.report.leaderboard import report_command
     from benchmarks.suites.frozen import frozen_suite, suite_names
     from benchmarks.suites.suite import SuiteError
 

@@ -15,12 +15,10 @@ from rich.markup import escape
 from rich.progress import Progress
 from rich.table import Table
 
-from benchmarks.comparison.command_lines import remove_command, run_command
-from benchmarks.executors.executor import run_all
-from benchmarks.executors.failures import ProcessDied, TookTooLong
+from benchmarks.executors.executor import ProcessDied, TookTooLong, run_all
 from benchmarks.executors.local import LocalProcesses
 from benchmarks.files import write_text
-from benchmarks.report.leaderboard import read_leaderboard
+from benchmarks.report.leaderboard import read_leaderboard, remove_command, run_command
 from benchmarks.report.standings import Standings
 from benchmarks.runner.case import BY_LIMIT, Row
 from benchmarks.runner.controller_spec import ControllerError, ControllerSpec
@@ -32,9 +30,9 @@ from benchmarks.runner.execution import (
     pending_cases,
     row_identity,
 )
+from benchmarks.runner.isolated_controller import MAKE_S, LateError, probe
 from benchmarks.runner.provenance import check_folder, run_info, write_run
 from benchmarks.runner.run import plain_progress
-from benchmarks.runner.user_controller import MAKE_S, LateError, probe
 from benchmarks.suites.reproduction import ReproductionSuite
 from benchmarks.suites.suite import Entry, FrozenSuite, SuiteError
 from controllers import CONTROLLERS

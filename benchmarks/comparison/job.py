@@ -14,9 +14,8 @@ from rich.console import Console
 from rich.table import Table
 
 from benchmarks.comparison.add import print_scores, write_scores
-from benchmarks.comparison.command_lines import report_command
 from benchmarks.executors.executor import Executor
-from benchmarks.report.leaderboard import keep_bounds
+from benchmarks.report.leaderboard import keep_bounds, report_command
 from benchmarks.runner.case import cases
 from benchmarks.runner.controller_spec import ControllerError, parse_controllers
 from benchmarks.runner.journal import JOURNAL, rewrite

@@ -8,10 +8,15 @@ from concurrent.futures.process import BrokenProcessPool
 from multiprocessing import get_context
 from typing import Generic, TypeVar, cast
 
-from benchmarks.executors.executor import ExecutorMissing, OnEnd
-from benchmarks.executors.failures import ProcessDied, TookTooLong
+from benchmarks.executors.executor import (
+    ExecutorMissing,
+    OnEnd,
+    ProcessDied,
+    TookTooLong,
+    run_packed,
+    unpacked,
+)
 from benchmarks.executors.lifetime import end_with_parent, interrupts_blocked
-from benchmarks.executors.work import run_packed, unpacked
 
 try:
     from pebble import ProcessExpired, ProcessPool

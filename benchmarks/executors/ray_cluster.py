@@ -10,10 +10,8 @@ from collections.abc import Mapping
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from typing import TYPE_CHECKING, Any
 
-from benchmarks.executors.executor import ExecutorMissing, OnEnd
-from benchmarks.executors.failures import ProcessDied
+from benchmarks.executors.executor import ExecutorMissing, OnEnd, ProcessDied, run_packed
 from benchmarks.executors.lifetime import end_with
-from benchmarks.executors.work import run_packed
 
 if TYPE_CHECKING:
     from ray import ObjectRef

@@ -11,11 +11,9 @@ from typing import Any
 from benchmarks.executors.executor import Executor, ThisProcess, run_all
 from benchmarks.files import write_text
 from benchmarks.hidden_effects.evaluation import records, scoring
-from benchmarks.hidden_effects.evaluation.measured import measured_now
-from benchmarks.hidden_effects.evaluation.records import CaseRecord
+from benchmarks.hidden_effects.evaluation.records import CaseRecord, measured_now
 from benchmarks.hidden_effects.evaluation.rounds import Judge, Work, diagnosed
-from benchmarks.hidden_effects.evaluation.tables import percent, table
-from benchmarks.hidden_effects.evaluation.targets import RATES
+from benchmarks.hidden_effects.evaluation.targets import RATES, percent, table
 from benchmarks.hidden_effects.evaluation.verdicts import Outcome
 from benchmarks.hidden_effects.generation.blocks import Block
 from benchmarks.hidden_effects.generation.undecidable import BLOCKS

@@ -1,5 +1,9 @@
-"""A suite's leaderboard: all that its page is made from, read from what a run left."""
+"""A suite's leaderboard: all that its page is made from, read from what a run left.
 
+The commands that messages name work as they stand in the folder of the user.
+"""
+
+import shlex
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -7,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.bounds import Bounds
-from benchmarks.comparison.command_lines import run_command
+from benchmarks.files import RESULTS
 from benchmarks.report.errors import Errors, Measure, SuiteRecord, measures, pooled_measure, task_of
 from benchmarks.report.margins import Condition, conditions, is_linear
 from benchmarks.report.standings import Standings
@@ -19,6 +23,38 @@ from controllers import CONTROLLERS
 from pma_gym.envs import StationInfo
 from pma_gym.pages.figures import notebook_html
 from pma_gym.tasks import ISOTONIC, TASKS, infeasibility_reason
+
+
+def run_command(suite: FrozenSuite, folder: Path) -> str:
+    """Return the command that runs a suite into a folder.
+
+    >>> from benchmarks.suites.frozen import frozen_suite
+    >>> run_command(frozen_suite("nominal"), Path("results/nominal"))
+    'python -m benchmarks run --suite nominal'
+    >>> run_command(frozen_suite("nominal"), Path("my results"))
+    "python -m benchmarks run --suite nominal --out 'my results'"
+    """
+    return _joined("run", "--suite", suite.source, *_folder("--out", suite, folder))
+
+
+def report_command(suite: FrozenSuite, folder: Path) -> str:
+    """Return the command that writes the report of a folder."""
+    return _joined("report", suite.source, *_folder("--results", suite, folder))
+
+
+def remove_command(name: str, suite: FrozenSuite, folder: Path) -> str:
+    """Return the command that removes a controller's rows from a folder's journal."""
+    results = [] if folder.parent == RESULTS else ["--results", str(folder.parent)]
+    return _joined("remove", name, "--suite", suite.source, *results)
+
+
+def _folder(option: str, suite: FrozenSuite, folder: Path) -> list[str]:
+    return [] if folder == RESULTS / suite.name else [option, str(folder)]
+
+
+def _joined(*words: str) -> str:
+    return shlex.join(["python", "-m", "benchmarks", *words])
+
 
 LOOP_TASKS = (*TASKS, *ISOTONIC)
 """Tasks whose loops are shown, the motor's and the regulator's. Unseen references have those of the

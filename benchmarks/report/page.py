@@ -7,9 +7,15 @@ from collections.abc import Mapping, Sequence
 
 from benchmarks.report.errors import PERCENT, is_bound, task_of
 from benchmarks.report.leaderboard import Leaderboard
-from benchmarks.report.loop_plots import loop_plot, loop_title, margin_table
 from benchmarks.report.plot_style import Style, styles_of
-from benchmarks.report.plots import distribution_plot, pressure_plot, profile_plot
+from benchmarks.report.plots import (
+    distribution_plot,
+    loop_plot,
+    loop_title,
+    margin_table,
+    pressure_plot,
+    profile_plot,
+)
 from benchmarks.report.standings import Standings
 from benchmarks.report.tables import (
     capital,

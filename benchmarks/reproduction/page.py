@@ -3,11 +3,12 @@
 from collections.abc import Mapping
 from typing import Any
 
-from benchmarks.reproduction.interactive import rmse_figure, tracking_figure
 from benchmarks.reproduction.plots import (
     actual_against_ideal_plot,
     replay_plot,
+    rmse_figure,
     rmse_plot,
+    tracking_figure,
     tracking_plot,
 )
 from benchmarks.reproduction.replay import all_replay_errors

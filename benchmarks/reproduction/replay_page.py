@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from statistics import fmean
 
-from benchmarks.reproduction.interactive import replay_figure
+from benchmarks.reproduction.plots import replay_figure
 from benchmarks.reproduction.replay import ReplayError, all_replay_errors, summarise, table_angle
 from benchmarks.reproduction.results import Results
 from benchmarks.reproduction.rotation_reading import reading_blocks

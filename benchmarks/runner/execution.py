@@ -6,8 +6,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any, cast
 
-from benchmarks.executors.executor import Executor, run_all
-from benchmarks.executors.failures import ProcessDied
+from benchmarks.executors.executor import Executor, ProcessDied, run_all
 from benchmarks.files import write_bytes
 from benchmarks.runner.case import Case, Row, cases, failed_row, run_case
 from benchmarks.runner.fingerprint import key

@@ -41,8 +41,7 @@ from rich.progress import Progress
 from scipy.optimize import minimize
 
 from benchmarks.executors.choice import local
-from benchmarks.executors.executor import run_all
-from benchmarks.executors.failures import ProcessDied
+from benchmarks.executors.executor import ProcessDied, run_all
 from benchmarks.files import toml_document, write_text
 from benchmarks.tuning.cost import Cost, chosen
 from benchmarks.tuning.loop_margins import lambda_tuning

@@ -4,70 +4,18 @@ A page says `<!-- generate: NAME -->` or `<!-- generate: NAME ARGUMENT -->` on a
 `expand` puts in Markdown instead, as far indented. GENERATORS lists the names.
 """
 
+import inspect
 import re
 from collections.abc import Callable
 from textwrap import indent
 
-from generators.catalogue import effects, overview
-from generators.commands import commands
-from generators.environments import (
-    disturbances,
-    docstring,
-    options,
-    randomisations,
-    rewards,
-    tasks,
-)
-from generators.equations import equations, ports, written
-from generators.exercise import (
-    exercise_check,
-    exercise_knee,
-    exercise_makers,
-    exercise_people,
-    exercise_ranges,
-    exercise_safety,
-    exercise_safety_text,
-    exercise_worst,
-)
-from generators.files import calibrations, columns, raw_columns, tables
-from generators.hidden_effects import (
-    hidden_baselines,
-    hidden_bound,
-    hidden_cases,
-    hidden_confused,
-    hidden_kinds,
-    hidden_measured,
-    hidden_misses,
-    hidden_parameters,
-    hidden_rates,
-    hidden_rounds,
-    hidden_seconds,
-    hidden_sizes,
-    hidden_summary,
-)
-from generators.models import differences, identification, misfit, parameters, shipped
-from generators.policies import policies_shipped
-from generators.source import misprints, rates, verdicts, wrong_in_print
-from generators.suite import controllers, example, targets, trials, tuning
-from generators.suites import episode_plans, occasional, suites
+from generators import catalogue, commands, dissertation, environments, models, results
 
 GENERATORS: dict[str, Callable[..., str]] = {
-    function.__name__: function
-    for function in (
-        *(effects, overview, commands, docstring, options, randomisations, rewards),
-        *(disturbances, tasks),
-        *(equations, ports, written, calibrations, columns, raw_columns, tables),
-        *(differences, identification, misfit, parameters, shipped),
-        *(misprints, rates, verdicts, wrong_in_print),
-        *(controllers, example, targets, trials, tuning),
-        *(suites, episode_plans, occasional),
-        *(hidden_rates, hidden_cases, hidden_sizes, hidden_rounds, hidden_misses),
-        *(hidden_baselines, hidden_bound, hidden_kinds, hidden_parameters, hidden_seconds),
-        *(hidden_confused, hidden_summary, hidden_measured),
-        policies_shipped,
-        *(exercise_check, exercise_worst, exercise_ranges, exercise_knee, exercise_makers),
-        *(exercise_people, exercise_safety, exercise_safety_text),
-    )
+    name: function
+    for module in (catalogue, commands, dissertation, environments, models, results)
+    for name, function in inspect.getmembers(module, inspect.isfunction)
+    if function.__module__ == module.__name__ and not name.startswith("_")
 }
 """Renderers by name; each takes the words after its name in the mark."""
 

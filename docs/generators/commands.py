@@ -6,7 +6,6 @@ import typer.main
 
 import benchmarks.__main__
 import benchmarks.hidden_effects.__main__
-import benchmarks.hidden_effects.baselines.__main__
 import pma_gym.cli
 from generators.text import code, table
 
@@ -14,12 +13,10 @@ PROGRAMS = {
     "pma-gym": pma_gym.cli.app,
     "benchmarks": benchmarks.__main__.app,
     "hidden_effects": benchmarks.hidden_effects.__main__.app,
-    "baselines": benchmarks.hidden_effects.baselines.__main__.app,
 }
 _CALLED = {
     "benchmarks": "python -m benchmarks",
     "hidden_effects": "python -m benchmarks.hidden_effects",
-    "baselines": "python -m benchmarks.hidden_effects.baselines",
 }
 
 

@@ -1,10 +1,17 @@
-"""The environments' tables: spaces, rewards, options."""
+"""Environments, tasks and controllers, and the suites that score them."""
 
+import inspect
 from dataclasses import MISSING, fields
+from pathlib import Path
 
-from generators.text import code, entries, sections, summary, table
+from benchmarks.runner.case import cases
+from benchmarks.suites.frozen import frozen_suite, load_suite, suite_names
+from benchmarks.suites.suite import FrozenSuite
+from benchmarks.tuning import tune
+from controllers import CONTROLLERS
+from generators.text import code, entries, number, sections, summary, table
 from pma_gym.envs import Options, PMAEnv
-from pma_gym.tasks import DISTURBANCES, EVERY_TASK, PULSE_S, RANDOMISATIONS, REWARDS
+from pma_gym.tasks import DISTURBANCES, EVERY_TASK, PULSE_S, RANDOMISATIONS
 from pma_gym.units import SI_FACTORS
 
 
@@ -25,11 +32,6 @@ def options() -> str:
         for option in fields(Options)
     ]
     return table(["Option", "Default", "Meaning"], rows)
-
-
-def rewards() -> str:
-    """Rewards by name."""
-    return table(["Reward", "What"], [[code(n), summary(r)] for n, r in REWARDS.items()])
 
 
 def randomisations() -> str:
@@ -76,3 +78,86 @@ def tasks() -> str:
         )
     header = ["Task", "Actuator", "Quantity", "Range", "Duration", "Phases"]
     return table([*header, "Begins at (kPa)", "Load"], rows)
+
+
+EXAMPLES = Path(__file__).parent.parent / "examples"
+
+
+def example(name: str) -> str:
+    """A file of `docs/examples`."""
+    text = (EXAMPLES / f"{name}.py").read_text(encoding="utf-8").rstrip()
+    return f'```python title="docs/examples/{name}.py"\n{text}\n```'
+
+
+def controllers() -> str:
+    """Every controller that comes with the project."""
+    scored = {spec.name for spec in load_suite().controllers}
+    rows = [
+        [code(name), summary(made), "yes" if name in scored else "no"]
+        for name, made in CONTROLLERS.items()
+    ]
+    return table(["Name", "What", "In the suite"], rows)
+
+
+def tuning() -> str:
+    """How the gains of the PIDs are found, as the script that finds them says."""
+    return f"```text\n{inspect.cleandoc(tune.__doc__ or '').partition(chr(10) * 2)[2]}\n```"
+
+
+def trials() -> str:
+    """Pressures of the suite's trials, by task."""
+    rows = [
+        [task, len(pressures), ", ".join(number(pressure) for pressure in pressures)]
+        for task, pressures in load_suite().pressures_kpa.items()
+    ]
+    return table(["Task", "Trials", "Pressures (kPa)"], rows, right=(1,))
+
+
+def suites() -> str:
+    """Every frozen suite: version, stations, episodes, loop."""
+    rows = []
+    for name in suite_names():
+        suite = frozen_suite(name)
+        counts = (len(suite.stations), len(suite.episodes), len(cases(suite, suite.entries)))
+        rows.append([code(name), suite.version, suite.title, *counts, _loop(suite)])
+    header = ["Suite", "Version", "What", "Stations", "Episodes", "Cases", "Loop"]
+    return table(header, rows, right=(1, 3, 4, 5))
+
+
+def episode_plans(name: str) -> str:
+    """Which trials the stations of a suite get."""
+    rows = [
+        [
+            ", ".join(map(code, plan.tasks)),
+            ", ".join(map(number, plan.pressures_kpa)),
+            plan.per_station or "all",
+            plan.repeats,
+        ]
+        for plan in frozen_suite(name).episode_plans
+    ]
+    return table(["Tasks", "Pressures (kPa)", "Trials a station", "Noise seeds"], rows, (2, 3))
+
+
+def occasional() -> str:
+    """What drawn stations may have that their model has not."""
+    recipe = frozen_suite("robust").recipe
+    assert recipe is not None
+    rows = []
+    for effect in recipe.effects:
+        parts = [
+            f"{code(file_key)} {number(low)} to {number(high)}"
+            for file_key, (low, high) in effect.ranges.items()
+            if low != high
+        ]
+        parts += [f"{code(d)} {factor:g} {code(to)}" for d, (to, factor) in effect.tied.items()]
+        rows.append([code(effect.name), f"{effect.share:.0%}", "; ".join(parts)])
+    return table(["Effect", "Stations that have it", "How strong"], rows)
+
+
+def _loop(suite: FrozenSuite) -> str:
+    words = [f"{suite.control_rate_hz:g} Hz"]
+    delay = suite.environment.get("action_delay_s", 0.0)
+    words += [f"commands {1e3 * delay:g} ms late"] if delay else []
+    disturbances = suite.environment.get("disturbances", "none")
+    words += [f"disturbed by {disturbances.replace('_', ' ')}"] if disturbances != "none" else []
+    return ", ".join(words)

@@ -118,11 +118,6 @@ class CompiledModel:
         }
         return truth | counted
 
-    def extrapolates(self, pressure: float) -> bool:
-        """Whether a pressure (Pa) lies outside the range of the model's identification."""
-        valid = self.model.parameters["validity"]
-        return not valid.lowest <= pressure <= valid.highest
-
 
 def regulator_voltage(model: Model, pressure: float) -> float:
     """Regulator voltage (V) of a model for a steady pressure (Pa).

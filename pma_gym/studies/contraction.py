@@ -193,13 +193,6 @@ def _compare_f_ratio() -> list[Comparison]:
     )
 
 
-def rounding_of_table_i2() -> float:
-    """Largest distance (N) of table I2's contractile force from the line of table I1."""
-    line, table = contractile_force_line(), load_table("I2")
-    force = line.intercept + line.slope * table["pressure_kpa"]
-    return float(np.max(np.abs(table["fce_n"] - force)))
-
-
 CONTRACTION = "contraction"
 RELAXATION = "relaxation"
 
@@ -213,18 +206,6 @@ RELAXATION_SPLIT_KPA = 372.0
 def _split(limit: float) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     low = load_table("I2")["pressure_kpa"] < limit
     return low, ~low
-
-
-def spring_lines() -> tuple[Regression, Regression]:
-    """Spring constant on pressure (N/mm by kPa), below and above 314 kPa, from table I2.
-
-    Source:
-        Serres 2008, tables 7-10.
-    """
-    table = load_table("I2")
-    below, above = _split(SPRING_SPLIT_KPA)
-    pressure, spring = table["pressure_kpa"], table["spring_n_per_mm"]
-    return regression(pressure[below], spring[below]), regression(pressure[above], spring[above])
 
 
 def secant_spring(table: Table) -> NDArray[np.float64]:

@@ -1,12 +1,9 @@
 """Limits of the station: tables 17 and 18 out of table I3 (section 5.2.1)."""
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 
 from pma_gym.data.serres2008 import Table, load_table
-from pma_gym.metrics import rmse
 from pma_gym.studies.comparison import (
     Comparison,
     compare,
@@ -14,24 +11,9 @@ from pma_gym.studies.comparison import (
     half_units,
     rounding_reach,
 )
-from pma_gym.studies.contraction import SPRING_SPLIT_KPA
 from pma_gym.studies.voltage_profile import Quadratic, printed_quadratics, used_quadratics
 
 STUDY = "station limits"
-
-
-def position_voltage_fit(pressure_kpa: float) -> tuple[Quadratic, float]:
-    """Least-squares quadratic of table I3's extension (m) on motor voltage (V), and its R2.
-
-    Args:
-        pressure_kpa: one of table I3's eleven, 150-575.
-
-    Source:
-        Serres 2008, table 18.
-    """
-    rows = load_table("I3").where(pressure_nominal_kpa=pressure_kpa)
-    figures = _fit(rows["motor_voltage_v"], 1e-3 * rows["extension_mm"])
-    return Quadratic(*figures[:3]), figures[3]
 
 
 def _fit(voltage: NDArray[np.float64], extension: NDArray[np.float64]) -> list[float]:
@@ -44,42 +26,6 @@ def _fit(voltage: NDArray[np.float64], extension: NDArray[np.float64]) -> list[f
 def compare_station_limits() -> list[Comparison]:
     """Tables 17, 18 and 23 and the text's figures beside table I3."""
     return _compare_table_17() + _compare_table_18() + _compare_text() + _compare_moments()
-
-
-class ThreeElementErrors(NamedTuple):
-    """RMSE of table 2's model against table I3: extension (mm), contraction (mm), force (N)."""
-
-    extension_mm: float
-    contraction_mm: float
-    force_n: float
-
-
-def three_element_errors() -> ThreeElementErrors:
-    """Deviation of table 2's model from the station's measurements, at nominal pressures.
-
-    Extension is load over K; contraction is (F_ce - load) / K; force is F_ce - K x contraction.
-    The three repeats of a measurement scatter by 0.74 mm in extension about their mean (n - 1 in
-    the divisor).
-
-    Source:
-        Serres 2008, table 2 and section 5.1.1 against table I3.
-    """
-    table = load_table("I3")
-    pressure, load, extension = (
-        table[name] for name in ("pressure_nominal_kpa", "load_n", "extension_mm")
-    )
-    low, high = load_table("2").where(parameter="spring_n_per_mm")["intercept"]
-    falling, rising = load_table("2").where(parameter="spring_n_per_mm")["slope_per_kpa"]
-    below = pressure <= SPRING_SPLIT_KPA
-    spring = np.where(below, low + falling * pressure, high + rising * pressure)
-    slope, intercept = load_table("text").where(section="5.1.1")["printed"]
-    force = slope * pressure + intercept
-    contraction = table["no_load_contraction_mm"] - extension
-    return ThreeElementErrors(
-        rmse(load / spring - extension),
-        rmse((force - load) / spring - contraction),
-        rmse(force - spring * contraction - load),
-    )
 
 
 def _at_load(pressure: str, load: float = 900.0) -> Table:

@@ -1,6 +1,5 @@
 """The cascade's transfer function as a recursion in time, and its inverse."""
 
-from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -114,17 +113,6 @@ def poles(recursion: Recursion) -> NDArray[np.complex128]:
     return np.roots([1.0, recursion.b, recursion.a]).astype(np.complex128)
 
 
-def forward_recursion(x_input: ArrayLike, recursion: Recursion) -> NDArray[np.float64]:
-    """Position that an input leads to, everything zero before the first sample.
-
-    Args:
-        x_input: input at the sample times, shape (n,).
-        recursion: coefficients for the sample time.
-    """
-    numerator = [recursion.e, recursion.d, recursion.c]
-    return _filtered(numerator, [1.0, recursion.b, recursion.a], x_input)
-
-
 def inverse_recursion(reference: ArrayLike, recursion: Recursion) -> NDArray[np.float64]:
     """Input whose recursion gives the reference, everything zero before the first sample.
 
@@ -142,14 +130,7 @@ def inverse_recursion(reference: ArrayLike, recursion: Recursion) -> NDArray[np.
     Source:
         Serres 2008, section 5.2.1 and tables I4-I20.
     """
-    denominator = [recursion.e, recursion.d, recursion.c]
-    return _filtered([1.0, recursion.b, recursion.a], denominator, reference)
-
-
-def _filtered(
-    numerator: Sequence[float], denominator: Sequence[float], signal: ArrayLike
-) -> NDArray[np.float64]:
-    """A signal behind a digital filter that begins with zeros."""
     from scipy.signal import lfilter
 
-    return np.asarray(lfilter(numerator, denominator, np.asarray(signal)))
+    denominator = [recursion.e, recursion.d, recursion.c]
+    return np.asarray(lfilter([1.0, recursion.b, recursion.a], denominator, np.asarray(reference)))

@@ -131,7 +131,7 @@ def test_a_folder_that_others_may_write_is_not_used(entry, which, mode):
         # Said once; the next library is kept in this process' own folder.
         warnings.simplefilter("error")
         assert value(True) == 1.0
-    assert compile_cache.cache_directory() != entry.parent.parent
+    assert compile_cache._store().folder.parent != entry.parent.parent
     assert entry.read_bytes() == content
     folder.chmod(0o700)
     reopen()

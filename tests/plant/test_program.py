@@ -190,7 +190,7 @@ def test_a_cache_that_cannot_be_written_is_replaced_with_one_warning():
         "for name in ('serres2008', 'station'):\n"
         "    plant = Plant(name)\n"
         "    print(plant.settle(0.0, 300e3).zero_contraction)\n"
-        "import pma_gym.codegen.cache.compile_cache as c; print(c.cache_directory())"
+        "import pma_gym.codegen.cache.compile_cache as c; print(c._store().folder.parent)"
     )
     out, error = run(code, PMA_GYM_CACHE="/proc/nope")
     first, _, folder = out.split()

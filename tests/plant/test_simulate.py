@@ -123,13 +123,6 @@ def test_what_ten_volts_cannot_give_is_refused(plant):
         plant.simulate(trial(WHEN, motor_voltage=1.0, pressure_command=600e3))
 
 
-def test_beyond_the_tables_it_extrapolates(plant):
-    assert not plant.extrapolates(150e3)
-    assert not plant.extrapolates(575e3)
-    assert plant.extrapolates(149e3)
-    assert plant.extrapolates(576e3)
-
-
 def test_a_muscle_that_runs_away_is_lost_at_once():
     """Softer than its force grows: a step of pressure leaves it nowhere to stop."""
     softening = {"linear": -1.145, "quadratic": -2.29}

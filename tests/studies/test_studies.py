@@ -6,12 +6,9 @@ from pma_gym.metrics import rmse_from_regression
 from pma_gym.studies import compare_all
 from pma_gym.studies.contraction import (
     contractile_force_line,
-    rounding_of_table_i2,
-    spring_lines,
     time_constants,
 )
 from pma_gym.studies.recursion import table_19_recursion
-from pma_gym.studies.station_limits import position_voltage_fit, three_element_errors
 from pma_gym.studies.trials import TRIALS, measured_regression
 
 
@@ -28,18 +25,6 @@ def test_force_at_the_resting_length():
     line = contractile_force_line()
     assert line.slope == pytest.approx(2.91, abs=0.005)
     assert line.intercept == pytest.approx(44.6, abs=0.05)
-
-
-def test_table_i2s_force_is_the_line_and_no_measurement():
-    # The line's printed figures and table I2's own rounding; nothing else is left.
-    assert rounding_of_table_i2() < 0.007
-
-
-def test_spring_constants_of_table_2():
-    low, high = spring_lines()
-    assert (low.intercept, low.slope) == pytest.approx((32.7, -0.0321), rel=1e-3)
-    assert (high.intercept, high.slope) == pytest.approx((17.0, 0.0179), rel=3e-3)
-    assert (low.n, high.n) == (35, 81)
 
 
 def test_time_constants_of_the_muscle_are_those_of_the_regulator():
@@ -69,14 +54,6 @@ def test_table_18_is_the_fit_of_table_i3_but_for_one_figure(rows):
     fits = [row for row in rows if row.table == "18" and row.study == "station limits"]
     assert len(fits) == 9 * 4
     assert wrong(fits, "18") == {"450 kPa v1_m_per_v"}
-
-
-@pytest.mark.parametrize("pressure", [275, 575])
-def test_quadratics_of_tables_i13_and_i20_are_fits_too(pressure):
-    quadratic, r_squared = position_voltage_fit(pressure)
-    rounded = {275: (-0.0006, 0.0114, -0.0054), 575: (-0.0001, 0.0060, -0.0029)}
-    assert tuple(round(value, 4) for value in quadratic) == rounded[pressure]
-    assert r_squared > 0.997
 
 
 def test_table_19_is_eq_25_sampled_at_7_8_ms(rows):
@@ -141,10 +118,3 @@ def test_corrected_cells_of_the_result_tables_are_wrong_in_print(rows):
 
 def test_900_n_are_not_246_lb(rows):
     assert "900 N in lb" in wrong(rows, "section 4.2.2")
-
-
-def test_table_2s_model_misses_the_stations_own_table():
-    errors = three_element_errors()
-    assert errors.extension_mm == pytest.approx(9.7, abs=0.1)
-    assert errors.contraction_mm == pytest.approx(4.5, abs=0.1)
-    assert errors.force_n == pytest.approx(113, abs=1)

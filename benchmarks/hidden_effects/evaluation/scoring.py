@@ -14,7 +14,6 @@ from typing import Any
 import numpy as np
 
 from benchmarks.hidden_effects.evaluation.records import CaseRecord
-from benchmarks.hidden_effects.evaluation.tables import table
 from benchmarks.hidden_effects.evaluation.targets import (
     COVERAGE,
     GAP_BLOCKS,
@@ -23,6 +22,7 @@ from benchmarks.hidden_effects.evaluation.targets import (
     RATES,
     SIZE_ERROR,
     Target,
+    table,
 )
 from benchmarks.hidden_effects.evaluation.verdicts import Outcome, compare, judged, unanswered
 from pma_gym.documents import read_json

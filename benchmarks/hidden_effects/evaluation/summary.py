@@ -5,8 +5,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from benchmarks.hidden_effects.evaluation.measured import Measured, measured_text
-from benchmarks.hidden_effects.evaluation.tables import instead, listed, percent
+from benchmarks.hidden_effects.evaluation.records import Measured, measured_text
+from benchmarks.hidden_effects.evaluation.targets import instead, listed, percent
 from benchmarks.hidden_effects.run_blocks import SCORE, JobError, merged
 from pma_gym.document_shape import ListOf, ShapeError, check_shape
 from pma_gym.documents import read_json

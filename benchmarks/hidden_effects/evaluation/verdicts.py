@@ -4,9 +4,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, get_args
 
+from benchmarks.hidden_effects.generation.effect_size import UNTOLD
 from benchmarks.hidden_effects.generation.effects import ALL
 from benchmarks.hidden_effects.generation.groups import expected, group
-from benchmarks.hidden_effects.generation.likelihood_ratios import UNTOLD
 from benchmarks.hidden_effects.rigs import effect_size
 from pma_gym.discovery.diagnosis import Verdict
 

@@ -12,12 +12,12 @@ from benchmarks.hidden_effects.generation.effect_size import (
     Ruler,
     describe,
     neighbours,
+    odds_of_parameters,
     scale_to,
     simulate_variants,
 )
 from benchmarks.hidden_effects.generation.effects import ALL, KINDS, OUTSIDE, Values
 from benchmarks.hidden_effects.generation.excitation import EXCITATIONS, draw_trial
-from benchmarks.hidden_effects.generation.likelihood_ratios import odds_of_parameters
 from benchmarks.hidden_effects.generation.readout_noise import NONE, ReadoutNoise, draw_noise
 from benchmarks.hidden_effects.physics import rig as rigs
 from benchmarks.hidden_effects.physics.rig import NOMINAL, SENSORS, UNITS, Array

@@ -9,8 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from benchmarks.hidden_effects.physics import drive, muscle, outside
-from benchmarks.hidden_effects.physics.effect import Hidden
-from benchmarks.hidden_effects.physics.rig import SENSORS, Array
+from benchmarks.hidden_effects.physics.rig import Array, Hidden
 
 Values = Mapping[str, float]
 Columns = Mapping[str, Array]
@@ -325,4 +324,3 @@ LEAKAGE: dict[str, Kind] = {
 """Effects outside the catalogue that only block `slow_drift` hides."""
 
 ALL = KINDS | OUTSIDE | LEAKAGE
-LAGS = {f"{sensor}_lag" for sensor in SENSORS}

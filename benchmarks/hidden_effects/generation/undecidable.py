@@ -17,6 +17,9 @@ from benchmarks.hidden_effects.generation.blocks import BLOCKS as USUAL
 from benchmarks.hidden_effects.generation.blocks import Block
 from benchmarks.hidden_effects.generation.cases import Case, draw_rig, measure
 from benchmarks.hidden_effects.generation.effect_size import (
+    SEEN,
+    UNTOLD,
+    Behind,
     Experiment,
     Ruler,
     describe,
@@ -27,7 +30,6 @@ from benchmarks.hidden_effects.generation.effects import ALL, KINDS, Values
 from benchmarks.hidden_effects.generation.excitation import LOW_EXCITATION, draw_low_excitation
 from benchmarks.hidden_effects.generation.files import named
 from benchmarks.hidden_effects.generation.groups import group
-from benchmarks.hidden_effects.generation.likelihood_ratios import SEEN, UNTOLD, Behind
 from benchmarks.hidden_effects.physics import rig as rigs
 from benchmarks.hidden_effects.physics.rig import SENSORS, Array
 from benchmarks.hidden_effects.physics.simulation import RATE, Commands

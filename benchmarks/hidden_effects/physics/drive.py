@@ -3,9 +3,8 @@
 import numpy as np
 from scipy.signal import lfilter
 
-from benchmarks.hidden_effects.physics.effect import Hidden, Moment
 from benchmarks.hidden_effects.physics.muscle import Bristles
-from benchmarks.hidden_effects.physics.rig import Array
+from benchmarks.hidden_effects.physics.rig import Array, Hidden, Moment
 
 ATMOSPHERE = 101325.0
 SUPPLY = 1000e3

@@ -3,8 +3,7 @@
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
-from benchmarks.hidden_effects.physics.effect import Hidden, Moment
-from benchmarks.hidden_effects.physics.rig import Array
+from benchmarks.hidden_effects.physics.rig import Array, Hidden, Moment
 
 
 class Bristles:

@@ -3,8 +3,7 @@
 import numpy as np
 from scipy.signal import lfilter
 
-from benchmarks.hidden_effects.physics.effect import Hidden, Moment
-from benchmarks.hidden_effects.physics.rig import BANDWIDTH, UNITS, Array, daq_steps
+from benchmarks.hidden_effects.physics.rig import BANDWIDTH, UNITS, Array, Hidden, Moment, daq_steps
 
 
 class SlowSensor(Hidden):

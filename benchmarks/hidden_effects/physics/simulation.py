@@ -10,11 +10,12 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.signal import lfilter
 
-from benchmarks.hidden_effects.physics.effect import Hidden, Moment
 from benchmarks.hidden_effects.physics.rig import (
     BANDWIDTH,
     ROTOR_DAMPING,
     Array,
+    Hidden,
+    Moment,
     Numbers,
     resistance,
     stiffness,

@@ -288,9 +288,6 @@ class EddyBrake(HiddenEffect):
         return -self.size * v * math.exp(-0.5 * place * place)
 
 
-OUTSIDE = (EndBumper, Detent, EddyBrake)
-"""What no catalogue has."""
-
 Force = Callable[[float, float, float], float]
 
 

@@ -43,18 +43,12 @@ class _Store:
     key: bytes = field(repr=False)
 
 
-def cache_directory() -> Path | None:
-    """Folder of compiled plants: $PMA_GYM_CACHE, else the user's cache folder.
-
-    If that folder cannot be created or written, or others can write to it, this is a temporary
-    folder of the process, with one warning; None if there is no temporary folder either.
-    """
-    store = _store()
-    return None if store is None else store.folder.parent
-
-
 def _store() -> _Store | None:
-    """The store that the environment variables name now."""
+    """The store that the environment variables name now; None if no folder can be used.
+
+    $PMA_GYM_CACHE, else the user's cache folder. If that cannot be created or written, or others
+    can write to it, this is in a temporary folder of the process, with one warning.
+    """
     asked = os.environ.get("PMA_GYM_CACHE")
     if asked:
         return _opened(Path(os.path.expanduser(asked)).absolute())

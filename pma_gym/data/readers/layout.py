@@ -3,7 +3,6 @@
 Units as laboratories write them: `[mm]`, `(°)`, `kPa`, `Volts`.
 """
 
-import datetime
 import re
 from collections.abc import Mapping, Sequence
 
@@ -153,14 +152,13 @@ def _filled(cell: object) -> bool:
 
 
 def _is_number(cell: object) -> bool:
-    """Whether a cell is a number, a date, or a text that is meant as one."""
+    """Whether a cell is a number, or a text that is meant as one or as a date."""
     if isinstance(cell, str):
         if len(cell) > _LONGEST:
             return False
         bare = bare_text(cell)
         return _NUMBER.fullmatch(bare) is not None or looks_like_clock(bare)
-    kinds = int | float | datetime.datetime | datetime.time | datetime.timedelta
-    return isinstance(cell, kinds) and not isinstance(cell, bool)
+    return isinstance(cell, int | float) and not isinstance(cell, bool)
 
 
 def _is_sample(row: Sequence[object]) -> bool:

@@ -105,6 +105,9 @@ def _rows(
                 value = _date(value, epoch) if dates[style] else float(value)
             elif value is None and cell.data_type == "n" and hasattr(cell, "row"):
                 empty.add((number, index))
+            elif value is not None and cell.data_type == "d":
+                # A date in ISO 8601, as strict workbooks have it.
+                value = str(value)
             row.append(None if value == "" else value)
             filled = filled if row[-1] is None else index + 1
         if filled:

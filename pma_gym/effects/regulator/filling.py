@@ -37,30 +37,17 @@ class Filling(NamedTuple):
     ]
 
 
-def braid_volume(contraction, p):
-    """Volume inside a braid of constant thread length.
-
-        V = L (b^2 - L^2) / (4 pi n^2),   L = L0 - x,   b^2 = L0^2 + (pi n D0)^2
-
-    Args:
-        contraction: shortening x from the resting length (m).
-        p: Filling.
-    Returns:
-        Volume (m^3).
-    """
-    length = p.resting_length - contraction
-    around = PI * p.turns * p.resting_diameter
-    thread2 = p.resting_length * p.resting_length + around * around
-    return length * (thread2 - length * length) / (4.0 * PI * p.turns * p.turns)
-
-
 def filling_rate(pressure, contraction, velocity, p):
     """Rate of pressure from the change of volume, in addition to the regulator's rate.
 
         P' = -exponent (P + P_atmosphere) V' / V,   V'/V = x' (3 L^2 - b^2) / (L (b^2 - L^2))
 
-    V is that of `braid_volume`; it grows with contraction up to the angle of 54.7 deg. The
-    volumes of the end caps and the hose, which reduce the rate, are neglected.
+    V is that inside a braid of constant thread length,
+
+        V = L (b^2 - L^2) / (4 pi n^2),   L = L0 - x,   b^2 = L0^2 + (pi n D0)^2
+
+    It grows with contraction up to the angle of 54.7 deg. The volumes of the end caps and the
+    hose, which reduce the rate, are neglected.
 
     Args:
         pressure: gauge pressure P (Pa).

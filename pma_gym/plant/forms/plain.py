@@ -16,7 +16,6 @@ from types import ModuleType
 
 import numpy as np
 
-from pma_gym.codegen.graph import Value
 from pma_gym.codegen.text import python_text
 from pma_gym.codegen.trace import live_inputs
 from pma_gym.integrator.equations import COMMANDS, ZERO
@@ -68,7 +67,7 @@ class PlainPlant:
         self.arguments = {name: [i.data for i in values] for name, values in inputs.items()}
         self.states = [entry.name for entry in system.equations.remembered]
         self.text = "\n\n".join(
-            _text(values, inputs[name], name) for name, values in functions.items()
+            python_text(values, inputs[name], name) for name, values in functions.items()
         )
         self.module = ModuleType(f"plain_{plant.model.name}")
         code = compile(self.text, f"<{self.module.__name__}>", "exec")
@@ -149,7 +148,3 @@ class PlainPlant:
         # NumPy's numbers divide by zero as compiled code does: inf or NaN, where a float raises.
         with np.errstate(all="ignore"):
             return function(*(np.float64(known[i]) for i in self.arguments[name]))
-
-
-def _text(values: list[Value], inputs: list[Value], name: str) -> str:
-    return python_text(values, inputs, name)

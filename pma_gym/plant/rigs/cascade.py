@@ -11,11 +11,8 @@ this is Eq. 22. We assume that the load cell measures the spring's force of the 
 which is F_ce - K x.
 """
 
-from collections.abc import Mapping
-
 from pma_gym.codegen.trace import trace
 from pma_gym.data.signals import signals
-from pma_gym.effects.effect import Parameters
 from pma_gym.effects.muscle.contractile_force import contractile_force
 from pma_gym.effects.muscle.stiffness import spring_stiffness
 from pma_gym.effects.ports import Port
@@ -108,12 +105,6 @@ def write_equations(equations: PlantEquations) -> None:
     eq.add_sensors(SCALES)
 
 
-def fastest_oscillation(parameters: Mapping[str, Parameters]) -> float:
-    """Natural frequency (rad/s) of the motor with its position loop; 0 without inertia."""
-    inertial = parameters.get("servo_inertia")
-    return (parameters["servo"].stiffness / inertial.inertia) ** 0.5 if inertial else 0.0
-
-
 def _write_servo(eq: PlantEquations) -> None:
     if not eq.at("servo_inertia"):
         eq.add_decaying("servo", eq.one("servo"), SCALES["servo"])
@@ -141,7 +132,6 @@ CASCADE = Rig(
     position_tolerances=POSITION_TOLERANCES,
     write_equations=write_equations,
     solve_equilibrium=solve_equilibrium,
-    fastest_oscillation=fastest_oscillation,
     refused_effects=REFUSED_EFFECTS,
     shipped_example="cascade",
 )

@@ -7,12 +7,9 @@ The motion is the input, so there is no balance of forces: F is the force on the
 inertia of the moved parts. The pressure follows a regulator's command or a measured record.
 """
 
-from collections.abc import Mapping
-
 from pma_gym.codegen.trace import trace
 from pma_gym.data.signals import signals
 from pma_gym.effects.contact.imposed_motion import following_rate
-from pma_gym.effects.effect import Parameters
 from pma_gym.effects.rig_ports import IMPOSED_PORTS
 from pma_gym.plant.composition import PlantEquations
 from pma_gym.plant.equilibrium.problem import EquilibriumProblem
@@ -68,11 +65,6 @@ def write_equations(equations: PlantEquations) -> None:
     eq.path_breakpoints.clear()
 
 
-def fastest_oscillation(parameters: Mapping[str, Parameters]) -> float:
-    """Return 0, because the motion is given."""
-    return 0.0
-
-
 def solve_equilibrium(problem: EquilibriumProblem) -> None:
     """Set the states to their steady values at the first commands."""
     problem.relax("pressure")
@@ -88,7 +80,6 @@ IMPOSED = Rig(
     position_tolerances={"contraction": 0.001, "velocity": 0.01},
     write_equations=write_equations,
     solve_equilibrium=solve_equilibrium,
-    fastest_oscillation=fastest_oscillation,
     refused_effects=REFUSED_EFFECTS,
     absent_signals=(
         "the motion is imposed, so force is what is compared; a measured motion is read by "

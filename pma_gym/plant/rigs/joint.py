@@ -6,10 +6,7 @@ The joint is free: [joint_start] gives the initial angle and speed of a trial. W
 damping and dry friction are effects at its port of torques.
 """
 
-from collections.abc import Mapping
-
 from pma_gym.data.signals import signals
-from pma_gym.effects.effect import Parameters
 from pma_gym.effects.rig_ports import JOINT_PORTS
 from pma_gym.plant.composition import PlantEquations
 from pma_gym.plant.equilibrium.problem import EquilibriumProblem
@@ -51,11 +48,6 @@ def write_equations(equations: PlantEquations) -> None:
     eq.add_breakpoints()
 
 
-def fastest_oscillation(parameters: Mapping[str, Parameters]) -> float:
-    """Return 0, because the rig has only one inertia."""
-    return 0.0
-
-
 def solve_equilibrium(problem: EquilibriumProblem) -> None:
     """Set the joint to the model's initial state, with relaxed bristles."""
     start = problem.parameters("joint_start")
@@ -71,7 +63,6 @@ JOINT = Rig(
     position_tolerances={"angle": 0.001},
     write_equations=write_equations,
     solve_equilibrium=solve_equilibrium,
-    fastest_oscillation=fastest_oscillation,
     absent_signals="a joint has neither muscle nor cable; take a torque as torque_command_n_m",
     is_free=True,
     start_paths={"angle": "joint_start.angle_deg", "spin": "joint_start.spin_deg_per_s"},

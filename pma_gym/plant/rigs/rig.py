@@ -4,7 +4,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 from pma_gym.data.signals import Signal
-from pma_gym.effects.effect import Parameters
 from pma_gym.effects.ports import Port
 from pma_gym.plant.composition import PlantEquations
 from pma_gym.plant.equilibrium.problem import EquilibriumProblem
@@ -23,8 +22,6 @@ class Rig:
             theirs.
         write_equations: writes the equations of motion, with the model's effects at the ports.
         solve_equilibrium: sets the states of an `EquilibriumProblem` to equilibrium.
-        fastest_oscillation: angular frequency (rad/s) of the fastest oscillation for given
-            parameters; 0 if there is none.
         refused_effects: effects without a meaning at their port on this rig, with the reason.
         absent_signals: reason why the rig lacks other signals, and what to do with a log that has
             them.
@@ -55,7 +52,6 @@ class Rig:
     position_tolerances: Mapping[str, float]
     write_equations: Callable[[PlantEquations], None]
     solve_equilibrium: Callable[[EquilibriumProblem], None]
-    fastest_oscillation: Callable[[Mapping[str, Parameters]], float]
     refused_effects: Mapping[str, str] = field(default_factory=dict)
     absent_signals: str = ""
     shipped_example: str = ""

@@ -7,10 +7,7 @@ There is no pulley and no pressure. L is a command, so a load cell in the link w
 information.
 """
 
-from collections.abc import Mapping
-
 from pma_gym.data.signals import signals
-from pma_gym.effects.effect import Parameters
 from pma_gym.effects.rig_ports import SLIDE_PORTS
 from pma_gym.plant.composition import PlantEquations
 from pma_gym.plant.equilibrium.problem import EquilibriumProblem
@@ -72,11 +69,6 @@ def write_equations(equations: PlantEquations) -> None:
     eq.add_breakpoints()
 
 
-def fastest_oscillation(parameters: Mapping[str, Parameters]) -> float:
-    """Return 0, because the rig has no oscillation."""
-    return 0.0
-
-
 def solve_equilibrium(problem: EquilibriumProblem) -> None:
     """Set the slide to the model's initial state, with relaxed bristles."""
     start = problem.parameters("start")
@@ -92,7 +84,6 @@ SLIDE = Rig(
     position_tolerances=POSITION_TOLERANCES,
     write_equations=write_equations,
     solve_equilibrium=solve_equilibrium,
-    fastest_oscillation=fastest_oscillation,
     refused_effects=REFUSED_EFFECTS,
     absent_signals=(
         "a slide has neither pulley nor pressure, and its load is its command; a measured load "

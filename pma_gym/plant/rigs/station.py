@@ -8,14 +8,11 @@
 The load cell measures the tension T. Effects add to these balances at their ports.
 """
 
-from collections.abc import Mapping
-
 from pma_gym.codegen.graph import Value
 from pma_gym.codegen.trace import trace
 from pma_gym.data.signals import signals
 from pma_gym.effects.cable.hanging_load import hanging_inertia
 from pma_gym.effects.cable.leg import leg_torque
-from pma_gym.effects.effect import Parameters
 from pma_gym.effects.ports import STATION_PORTS
 from pma_gym.plant.composition import PlantEquations
 from pma_gym.plant.equilibrium.force_balance import solve_station
@@ -68,14 +65,6 @@ def write_equations(equations: PlantEquations) -> None:
         "pressure": eq["pressure"],
     }
     _write_states(eq)
-
-
-def fastest_oscillation(parameters: Mapping[str, Parameters]) -> float:
-    """Frequency (rad/s) of the oscillation of slide against rotor on the cable."""
-    rotor, slide = parameters["rotor"], parameters["slide"]
-    return (
-        parameters["cable"].stiffness * (1.0 / slide.mass + rotor.radius**2 / rotor.inertia)
-    ) ** 0.5
 
 
 def _write_drive(eq: PlantEquations) -> None:
@@ -133,7 +122,6 @@ STATION = Rig(
     position_tolerances=POSITION_TOLERANCES,
     write_equations=write_equations,
     solve_equilibrium=solve_station,
-    fastest_oscillation=fastest_oscillation,
     shipped_example="serres2008",
     balances_loads=True,
     is_diagnosable=True,

@@ -11,9 +11,9 @@ from benchmarks.__main__ import app
 from benchmarks.comparison.add import print_clipping
 from benchmarks.runner.case import Case, run_case
 from benchmarks.runner.controller_spec import ControllerError, ControllerSpec
+from benchmarks.runner.isolated_controller import Guarded, LateError
 from benchmarks.runner.journal import Journal
 from benchmarks.runner.rollout import rollout
-from benchmarks.runner.user_controller import Guarded, LateError
 from benchmarks.suites.frozen import frozen_suite
 from benchmarks.suites.suite import NOMINAL, Episode
 from pma_gym.envs import PMAEnv

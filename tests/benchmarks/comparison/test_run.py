@@ -20,8 +20,7 @@ from benchmarks.comparison.add import SCORES, TIMES
 from benchmarks.comparison.compare import compare
 from benchmarks.comparison.job import chosen, run_comparison
 from benchmarks.executors.choice import ExecutorName, executor_named
-from benchmarks.executors.executor import ThisProcess
-from benchmarks.executors.failures import ProcessDied
+from benchmarks.executors.executor import ProcessDied, ThisProcess
 from benchmarks.runner import fingerprint, provenance
 from benchmarks.runner.case import cases, failed_row
 from benchmarks.runner.execution import execute, pending_cases

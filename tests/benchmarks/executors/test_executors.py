@@ -13,8 +13,13 @@ from pathlib import Path
 import pytest
 
 from benchmarks.executors.choice import ExecutorName, executor_named, local
-from benchmarks.executors.executor import ThisProcess, run_all, run_or_raise
-from benchmarks.executors.failures import ProcessDied, TookTooLong
+from benchmarks.executors.executor import (
+    ProcessDied,
+    ThisProcess,
+    TookTooLong,
+    run_all,
+    run_or_raise,
+)
 from benchmarks.executors.local import LocalProcesses
 from benchmarks.runner.controller_spec import ControllerSpec
 from benchmarks.runner.execution import execute, pending_cases

@@ -8,8 +8,7 @@ from rich.console import Console
 from typer.testing import CliRunner
 
 from benchmarks.__main__ import app
-from benchmarks.exercise.choice import SEARCHED, Choice
-from benchmarks.exercise.choose_device import run_exercise
+from benchmarks.exercise.choose_device import SEARCHED, Choice, run_exercise
 from benchmarks.exercise.profile import ProfileError, held, read_profile
 from pma_gym.plant.exercise_device.device import (
     FULL_ANGLE,

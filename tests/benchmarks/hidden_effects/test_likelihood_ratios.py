@@ -5,14 +5,14 @@ import pytest
 
 from benchmarks.hidden_effects.evaluation.verdicts import compare, unanswered
 from benchmarks.hidden_effects.generation.cases import SCALED_TOGETHER, draw_case
-from benchmarks.hidden_effects.generation.effect_size import Experiment
-from benchmarks.hidden_effects.generation.excitation import draw_trial
-from benchmarks.hidden_effects.generation.likelihood_ratios import (
+from benchmarks.hidden_effects.generation.effect_size import (
     KNOWN,
     UNTOLD,
     Behind,
+    Experiment,
     odds_of_parameters,
 )
+from benchmarks.hidden_effects.generation.excitation import draw_trial
 from benchmarks.hidden_effects.physics.rig import NOMINAL, noise_levels
 from benchmarks.hidden_effects.physics.simulation import Commands
 from tests.benchmarks.hidden_effects.cheap_diagnosis import document

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.executors.failures import ProcessDied
+from benchmarks.executors.executor import ProcessDied
 from benchmarks.tuning import tune
 from benchmarks.tuning.cost import UNSTABLE_COST, Cost, scaled_model
 from benchmarks.tuning.loop_margins import Loop, lambda_tuning

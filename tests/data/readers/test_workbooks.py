@@ -21,9 +21,10 @@ ROWS = 20
 SAMPLES = [(k / 10, k / 5, 40 - k / 2) for k in range(ROWS)]
 
 
-def book(path, **sheets):
+def book(path, iso_dates=False, **sheets):
     """A workbook with rows a sheet; one with no argument has the one of the samples."""
     made = openpyxl.Workbook()
+    made.iso_dates = iso_dates
     made.remove(made.active)
     for title, rows in (sheets or {"run": [HEADER, *SAMPLES]}).items():
         sheet = made.create_sheet(title)
@@ -141,13 +142,14 @@ def test_formulas_without_stored_values_are_named_and_with_them_are_read(tmp_pat
     assert read_trial(path).measurements["contraction"][0] == pytest.approx(2e-3)
 
 
-def test_dates_in_the_time_column_become_seconds(tmp_path):
+@pytest.mark.parametrize("iso_dates", [False, True])
+def test_dates_in_the_time_column_become_seconds(iso_dates, tmp_path):
     start = datetime.datetime(2026, 3, 1, 10, 11, 12)
     for k, convert in enumerate(
         (lambda t: start + datetime.timedelta(seconds=t), lambda t: datetime.timedelta(seconds=t))
     ):
         path = tmp_path / f"{k}.xlsx"
-        book(path, run=[HEADER, *[(convert(t), u, x) for t, u, x in SAMPLES]])
+        book(path, iso_dates, run=[HEADER, *[(convert(t), u, x) for t, u, x in SAMPLES]])
         with pytest.warns(TrialWarning, match="converted to seconds from the first row"):
             trial = read_trial(path)
         assert_allclose(trial.time, [t for t, _, _ in SAMPLES], atol=1e-5)
