@@ -4,6 +4,7 @@ import math
 from functools import cache
 
 import numpy as np
+import pytest
 
 from pma_gym import Plant
 from pma_gym.data.trial import Trial
@@ -49,6 +50,7 @@ def logs(*channels):
     return trials
 
 
+@pytest.mark.campaign
 def test_one_late_column_is_that_sensors_delay_with_its_size():
     diagnosis = diagnose(logs("angle", "speed"), ARM, propose=False)
     assert diagnosis.verdict == "effect", diagnosis.sentence

@@ -51,6 +51,7 @@ def test_a_trial_begins_as_fast_as_its_readings_say():
     assert float(np.mean(left**2)) == pytest.approx(1.0, abs=0.1)
 
 
+@pytest.mark.campaign
 def test_dry_friction_is_found_by_speed_alone_within_its_interval():
     diagnosis = diagnose(logs(), MODEL, propose=False)
     (effect,) = diagnosis.effects

@@ -95,7 +95,7 @@ def lead(on: FitProblem, name: str) -> float:
     return 0.5 * (fitted(on, other).chi_square - fitted(on, name).chi_square)
 
 
-@pytest.mark.parametrize("true", TRUTHS)
+@pytest.mark.parametrize("true", ["hysteresis", pytest.param("creep", marks=pytest.mark.campaign)])
 def test_proposed_trial_tells_what_was_promised(true):
     truth, on, rivals, proposal = case(true)
     assert proposal is not None and proposal.separates == tuple(TRUTHS)
@@ -189,6 +189,7 @@ def test_the_chance_to_show_counts_sizes_in_proportion():
     assert chance_to_show(gains) == pytest.approx([0.0, 0.0, 0.5, 1.0, 1.0])
 
 
+@pytest.mark.campaign
 def test_who_knows_nothing_is_proposed_what_moves_load_and_pressure():
     """Of a trial at rest nearly everything is hidden: moving one of both shows less."""
     time = np.arange(0.0, 4.0, 1.0 / 64.0)

@@ -1,78 +1,63 @@
 """An interrupted diagnosis goes on, and ends as if nothing had happened."""
 
 import json
-import shutil
 
 import numpy as np
 import pytest
 
 from pma_gym.data.trial import Trial
 from pma_gym.discovery.fitting.journal import Journal, JournalWarning, digest
+from pma_gym.discovery.selection.candidate_fits import refit
 from pma_gym.discovery.workflow import diagnose
-from tests.discovery.laboratory import OFF, STATION, diagnosed, laboratory
+from tests.discovery.laboratory import OFF, STATION, diagnosed, fit_problem, laboratory
+
+SMALL = ("hysteresis", 2, 32.0)
 
 
 @pytest.fixture(scope="module")
 def trials():
-    return laboratory("hysteresis")[0]
+    return laboratory(*SMALL)[0]
 
 
-def interrupted(trials, folder, step, done, jobs=1):
-    """Diagnose until so much of a step is done; the journal's files, and what they hold."""
+def contents(folder):
+    return {path.name: path.read_bytes() for path in folder.iterdir()}
 
+
+@pytest.mark.parametrize(
+    ("step", "done", "jobs"),
+    [
+        ("trials left out", 1, 2),
+        pytest.param("fitting effect 1", 3, 1, marks=pytest.mark.campaign),
+    ],
+)
+def test_neither_jobs_nor_a_journal_nor_an_interrupt_change_a_byte(
+    trials, tmp_path, step, done, jobs
+):
     def progress(name, number, total):
         if name.startswith(step) and number >= done:
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        diagnose(trials, STATION, jobs=jobs, journal=folder, progress=progress)
-    left = {path.name: path.read_bytes() for path in folder.iterdir()}
-    assert left
-    return left
-
-
-@pytest.fixture(scope="module")
-def written(trials, tmp_path_factory):
-    """The journal of a diagnosis by two jobs, which was interrupted and went on, and its text."""
-    folder = tmp_path_factory.mktemp("journal")
-    left = interrupted(trials, folder, "trials left out", 1, jobs=2)
-    text = diagnose(trials, STATION, jobs=2, journal=folder, propose=False).text()
+        diagnose(trials, STATION, jobs=jobs, journal=tmp_path, progress=progress)
+    left = contents(tmp_path)
+    whole = [diagnose(trials, STATION, jobs=jobs, journal=tmp_path, propose=False).text()]
     # What was finished was not done again.
-    assert left.items() <= {path.name: path.read_bytes() for path in folder.iterdir()}.items()
-    return folder, text
-
-
-def test_neither_jobs_nor_a_journal_nor_an_interrupt_change_a_byte(written):
-    assert written[1] == diagnosed("hysteresis").text()
-
-
-@pytest.mark.campaign
-def test_a_diagnosis_that_is_interrupted_in_the_midst_of_its_fits_goes_on(
-    trials, written, tmp_path
-):
-    left = interrupted(trials, tmp_path, "fitting effect 1", 3)
-    assert diagnose(trials, STATION, journal=tmp_path, propose=False).text() == written[1]
-    assert left.items() <= {path.name: path.read_bytes() for path in tmp_path.iterdir()}.items()
-
-
-def test_a_whole_journal_gives_the_same_again(trials, written):
-    folder, text = written
-    times = {path.name: path.stat().st_mtime_ns for path in folder.iterdir()}
-    assert diagnose(trials, STATION, journal=folder, propose=False).text() == text
-    assert {path.name: path.stat().st_mtime_ns for path in folder.iterdir()} == times
+    assert left and left.items() <= contents(tmp_path).items()
+    times = {path.name: path.stat().st_mtime_ns for path in tmp_path.iterdir()}
+    whole.append(diagnose(trials, STATION, journal=tmp_path, propose=False).text())
+    assert whole == [diagnosed(*SMALL).text()] * 2
+    assert {path.name: path.stat().st_mtime_ns for path in tmp_path.iterdir()} == times
 
 
 @pytest.mark.parametrize("broken", [b"", b"{", b"[]", b"\xff\xfe", b"null"])
 def test_broken_files_are_passed_over(trials, tmp_path, broken):
-    folder = tmp_path / "broken"
-    journal = Journal(folder, trials, STATION, "")
+    journal = Journal(folder := tmp_path / "broken", trials, STATION, "")
     journal.keep("fit", {"chi_square": 1.0})
     for path in folder.iterdir():
         path.write_bytes(broken)
     journal.keep("other", {"chi_square": 2.0})
     with pytest.warns(JournalWarning, match="broken holds a damaged fit .* computed anew") as said:
-        assert journal.entry("fit") is None
-        assert journal.entry("fit") is None
+        assert [journal.entry("fit") for _ in range(2)] == [None, None]
     assert len(said) == 1
     assert journal.entry("other") == {"chi_square": 2.0}
 
@@ -95,17 +80,16 @@ OTHER_FORMS = {
 }
 
 
-def test_broken_entries_and_those_of_other_forms_are_computed_anew(trials, written, tmp_path):
-    folder = tmp_path / "other"
-    shutil.copytree(written[0], folder)
-    paths = sorted(folder.iterdir())
-    for number, path in enumerate(paths):
-        harm = list(OTHER_FORMS.values())[number % len(OTHER_FORMS)]
-        path.write_text(harm(json.loads(path.read_text())))
-    assert len(paths) >= len(OTHER_FORMS)
-    with pytest.warns(JournalWarning) as said:
-        assert diagnose(trials, STATION, journal=folder, propose=False).text() == written[1]
-    assert len(said) == 1
+@pytest.mark.parametrize("form", OTHER_FORMS)
+def test_an_entry_of_another_form_is_computed_anew(trials, tmp_path, form):
+    problem = fit_problem(trials[:1])
+    begun = problem.fit(STATION)
+    fit = refit(problem, begun, (), Journal(tmp_path, trials, STATION, ""))
+    (path,) = tmp_path.iterdir()
+    path.write_text(OTHER_FORMS[form](json.loads(kept := path.read_text())))
+    with pytest.warns(JournalWarning):
+        again = refit(problem, begun, (), Journal(tmp_path, trials, STATION, ""))
+    assert again.chi_square == fit.chi_square and path.read_text() == kept
 
 
 def test_another_question_finds_nothing(trials, tmp_path):
@@ -126,23 +110,20 @@ def test_another_question_finds_nothing(trials, tmp_path):
 
 
 def test_a_missing_reading_is_not_a_missing_signal(trials):
-    trial = trials[0]
-    renamed = Trial(trial.time, trial.commands, {"load": trial.measurements["pressure"]})
-    plain = Trial(trial.time, trial.commands, {"pressure": trial.measurements["pressure"]})
-    assert digest([renamed], STATION, "") != digest([plain], STATION, "")
+    trial, read = trials[0], trials[0].measurements["pressure"]
+    one, other = (
+        digest([Trial(trial.time, trial.commands, {name: read})], STATION, "")
+        for name in ("load", "pressure")
+    )
+    assert one != other
 
 
-def test_no_folder_keeps_nothing(trials):
-    journal = Journal(None, trials, STATION, "")
-    journal.keep("fit", {"chi_square": 1.0})
-    assert journal.entry("fit") is None
-
-
-def test_a_folder_is_made_when_something_is_kept(trials, tmp_path):
-    folder = tmp_path / "deep" / "er"
-    journal = Journal(folder, trials, STATION, "")
+def test_a_folder_is_made_when_something_is_kept_and_none_keeps_nothing(trials, tmp_path):
+    folder, kept = tmp_path / "deep" / "er", {"chi_square": 1.0}
+    journals = [Journal(each, trials, STATION, "") for each in (folder, None)]
     assert not folder.exists()
-    journal.keep("fit", {"chi_square": 1.0})
+    for journal in journals:
+        journal.keep("fit", kept)
     assert [path.suffix for path in folder.iterdir()] == [".json"]
-    assert journal.entry("fit") == {"chi_square": 1.0}
-    assert journal.entry("other") is None
+    assert [journal.entry("fit") for journal in journals] == [kept, None]
+    assert journals[0].entry("other") is None

@@ -97,6 +97,7 @@ def held(volts, kpa, truth, seed):
     return plant.simulate(Trial(time, commands), seed=seed)
 
 
+@pytest.mark.campaign
 def test_an_effect_that_one_trial_of_three_shows_is_named():
     """The other two hold neither it nor the parameters: of them alone the third is a guess."""
     truth = STATION.with_effects(HYSTERESIS).replace(OFF)

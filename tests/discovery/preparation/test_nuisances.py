@@ -274,6 +274,7 @@ def test_a_projection_makes_noise_with_a_drift_white() -> None:
     assert eye @ covariance @ eye == pytest.approx(outside, abs=1e-9)
 
 
+@pytest.mark.campaign
 def test_hum_is_named_and_does_not_alarm() -> None:
     """50 Hz of 1.2 sd in all sensors: the model still agrees or data are too few, no structure."""
     time = np.arange(0.0, 6.0, 1 / RATE)

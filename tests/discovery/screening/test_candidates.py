@@ -168,6 +168,7 @@ def test_beside_another_model_keeps_its_parameters():
         assert candidate.effect in beside.parameters
 
 
+@pytest.mark.campaign
 def test_an_effect_of_ones_own_takes_part(forget_user_effects, tmp_path):
     path = tmp_path / "mine.py"
     path.write_text(OWN, encoding="utf-8")

@@ -106,6 +106,7 @@ def test_the_given_model_is_proposed_where_no_parameter_is_off():
     assert said(diagnosis) == [f"{NAMED}none of 20 is needed to explain these trials."]
 
 
+@pytest.mark.campaign
 def test_what_is_off_but_hardly_shows_leaves_the_model_as_it_is(monkeypatch):
     monkeypatch.setattr(decision, "MOVED_CHANGE", np.inf)
     diagnosis = diagnose(laboratory("parameters", 6)[0], STATION, propose=False)
@@ -114,6 +115,7 @@ def test_what_is_off_but_hardly_shows_leaves_the_model_as_it_is(monkeypatch):
     assert words.endswith("of the noise: the model stays as it was given.")
 
 
+@pytest.mark.campaign
 def test_intervals_hold_where_all_numbers_are_a_little_off():
     """Of named parameters some nine in ten, and far more than if the others were exact."""
     own, held = free_parameters(STATION), []
@@ -148,6 +150,7 @@ def test_intervals_hold_where_all_numbers_are_a_little_off():
         ),
     ],
 )
+@pytest.mark.campaign
 def test_a_named_parameter_that_another_could_stand_for_comes_with_a_note(
     path, factor, named, words
 ):

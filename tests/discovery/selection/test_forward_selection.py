@@ -182,6 +182,7 @@ def readings(trials):
     return fit_problem(trials).whitened_residuals(STATION).count
 
 
+@pytest.mark.campaign
 def test_a_beat_of_the_cable_opens_the_gate_for_what_makes_it(monkeypatch):
     trials = taut({"drive_dead_zone": {"width_n": 5.0, "slope": 2.0}})
     scan, selection = by_bursts_alone(trials, monkeypatch)
@@ -199,6 +200,7 @@ def test_a_cable_that_comes_taut_as_it_should_is_no_burst(monkeypatch):
     assert selection.chosen == () and selection.stages[0].gate == ()
 
 
+@pytest.mark.campaign
 def test_noise_larger_in_places_bursts_but_names_nothing(monkeypatch):
     trials, generator = [], np.random.default_rng(0)
     for trial in taut({}):

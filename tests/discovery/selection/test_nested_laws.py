@@ -166,6 +166,7 @@ def test_limits_stay_within_what_the_catalogue_allows(monkeypatch, largest):
     assert limits(bench, fit, (DRY,), SPEED) == (quantity.lower, quantity.upper)
 
 
+@pytest.mark.campaign
 def test_no_value_is_said_of_what_is_not_determined():
     logs, _ = rubbing(12.0, 12.0, 5.0)
     diagnosis = diagnose(logs, SLIDE, propose=False)

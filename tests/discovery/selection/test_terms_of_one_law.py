@@ -87,7 +87,15 @@ def test_friction_by_load_has_a_share_of_what_is_carried_only_where_it_shows(car
     assert share == pytest.approx(30.0, rel=0.02)
 
 
-@pytest.mark.parametrize(("force", "slope"), [(0.5, 3e-3), (1.0, 2e-3), (1.0, 0.0), (0.0, 3e-3)])
+@pytest.mark.parametrize(
+    ("force", "slope"),
+    [
+        pytest.param(0.5, 3e-3, marks=pytest.mark.campaign),
+        pytest.param(1.0, 2e-3, marks=pytest.mark.campaign),
+        pytest.param(1.0, 0.0, marks=pytest.mark.campaign),
+        (0.0, 3e-3),
+    ],
+)
 def test_friction_of_a_seal_has_both_parts_where_both_are_there_and_one_where_one_is(force, slope):
     """Each changes less beside the other than is looked for by itself."""
     hidden = {

@@ -1,6 +1,7 @@
 """The contract: what a verdict needs before it denies missing structure."""
 
 from dataclasses import replace
+from functools import cache
 from types import SimpleNamespace
 
 import numpy as np
@@ -10,16 +11,14 @@ from pma_gym.data.datasets.dataset import Dataset, NamedTrial
 from pma_gym.data.trial import Trial
 from pma_gym.discovery.preparation.acceptance_floors import Stated, acceptance_floors, is_summary
 from pma_gym.discovery.preparation.splits import fold_of_rows, folds
-from pma_gym.discovery.report.verdict_text import sentence
-from pma_gym.discovery.result.noise import Judgement
 from pma_gym.discovery.verdict.adequacy import MOST_EXPLAINED, Residual, adequacy
 from pma_gym.discovery.verdict.flexible_regression import Explained, explained, variables
 from pma_gym.discovery.verdict.worsened import worsened
-from pma_gym.discovery.workflow import diagnose, refit
+from pma_gym.discovery.workflow import refit
 from pma_gym.estimation.logged import Logged
 from pma_gym.plant.plant import Plant
 from pma_gym.plant.rigs import RIGS
-from tests.discovery.laboratory import LEVELS, OFF, STATION, commanded, diagnosed, measured
+from tests.discovery.laboratory import BUMP, HYSTERESIS, LEVELS, STATION, commanded, measured
 
 TRUE = dict(zip(RIGS["station"].outputs, LEVELS, strict=True))
 
@@ -56,25 +55,19 @@ def rounded(trial, step):
 # -- floors ----------------------------------------------------------------------------------------
 
 
-def test_rest_segments_give_the_noise_of_the_sensors():
-    levels = floors(measured(STATION, 6))
-    for name, floor in levels.items():
-        assert floor.source == "rest segments"
-        assert floor.level == pytest.approx(TRUE[name], rel=0.25)
-
-
 def test_a_tolerance_comes_before_rest_and_repeats_before_a_tolerance():
-    trials = measured(STATION, 3)
-    stated = Stated({"contraction": 2e-4})
+    trials, plant, stated = measured(STATION, 6), Plant(STATION), Stated({"contraction": 2e-4})
     levels = floors(trials, stated)
     assert (levels["contraction"].source, levels["contraction"].level) == ("tolerance", 2e-4)
-    assert levels["load"].source == "rest segments"
-    plant = Plant(STATION)
-    repeats = [plant.simulate(commanded(1)[0], seed=seed) for seed in (1, 2, 3)]
-    levels = floors(repeats, stated)
-    for name in RIGS["station"].outputs:
+    for name in ("rotation", "load", "pressure"):
+        assert levels[name].source == "rest segments"
+        assert levels[name].level == pytest.approx(TRUE[name], rel=0.25)
+    levels = floors([plant.simulate(commanded(1)[0], seed=seed) for seed in (1, 2, 3)], stated)
+    for name, level in TRUE.items():
         assert levels[name].source == "repeats"
-        assert levels[name].level == pytest.approx(TRUE[name], rel=0.15)
+        assert levels[name].level == pytest.approx(level, rel=0.15)
+    # A file that was copied is no repeat.
+    assert floors([trials[0], trials[0]])["load"].source == "rest segments"
 
 
 @pytest.mark.parametrize(("step", "tolerance"), [(0.0, 1e-5), (2.5e-4, 3e-5)])
@@ -118,18 +111,9 @@ def test_repeats_that_share_the_phase_of_mains_are_no_quieter_than_rest():
     assert loud == pytest.approx(np.sqrt(3.0) * TRUE["pressure"], rel=0.15)
 
 
-def test_a_file_that_was_copied_is_no_repeat():
-    trial = measured(STATION, 1)[0]
-    assert floors([trial, trial])["load"].source == "rest segments"
-
-
-def test_an_encoder_that_stands_still_at_rest_has_no_floor():
-    silent = [Plant(STATION).simulate(each, noise=False) for each in commanded(3)]
-    assert floors(silent) == {}
-
-
-def test_what_never_rests_has_no_floor():
+def test_neither_what_never_rests_nor_an_encoder_that_stands_still_at_rest_has_a_floor():
     assert floors(moving(3)) == {}
+    assert floors([Plant(STATION).simulate(each, noise=False) for each in commanded(3)]) == {}
 
 
 def test_of_a_summary_the_printed_standard_errors_count():
@@ -145,29 +129,29 @@ def test_of_a_summary_the_printed_standard_errors_count():
 # -- regression ------------------------------------------------------------------------------------
 
 
-def regressed(made, number=6, seconds=5.0):
+@cache
+def readings(number=6):
+    """Trials at nearly one pressure."""
+    asked = commanded(number, seconds=5.0, kpa=(300.0, 330.0))
+    return [Plant(STATION).simulate(each, seed=k) for k, each in enumerate(asked)]
+
+
+def regressed(made):
     """What is explained of residuals that `made` makes of a trial's rows and its number."""
-    trials = logs(commanded_readings(number, seconds))
+    trials = logs(readings())
     generator = np.random.default_rng(7)
     parts = [generator.normal(size=len(each.time)) + made(each, k) for k, each in enumerate(trials)]
     given = [variables(each, each.measured) for each in trials]
     blocks = [100 * k + each.time.astype(int) for k, each in enumerate(trials)]
-    return explained(
-        parts, given, [np.full(len(e.time), k) for k, e in enumerate(trials)], blocks, 1
-    )
+    return explained(parts, given, [0 * each + k for k, each in enumerate(blocks)], blocks, 1)
 
 
-def commanded_readings(number, seconds):
-    return [
-        Plant(STATION).simulate(each, seed=k)
-        for k, each in enumerate(commanded(number, seconds=seconds, kpa=(300.0, 330.0)))
-    ]
-
-
-def test_of_noise_nothing_is_explained():
-    explained = regressed(lambda logged, k: 0.0)
-    assert abs(explained.mean) < 0.02
-    assert explained.bound(0.0125, np.random.default_rng(0)) < MOST_EXPLAINED**2
+def test_of_noise_and_of_what_differs_from_trial_to_trial_nothing_is_explained():
+    """A slow drift, another in every trial, repeats with nothing."""
+    noise, waves = regressed(lambda *_: 0.0), np.random.default_rng(3).uniform(0.0, 6.0, 6)
+    assert abs(noise.mean) < 0.02
+    assert noise.bound(0.0125, np.random.default_rng(0)) < MOST_EXPLAINED**2
+    assert regressed(lambda logged, k: np.sin(0.9 * logged.time + waves[k])).mean < 0.2
 
 
 def late(logged):
@@ -221,16 +205,8 @@ STRUCTURE = {
 
 @pytest.mark.parametrize("law", STRUCTURE)
 def test_what_follows_state_command_or_its_history_is_explained(law):
-    explained = regressed(STRUCTURE[law])
-    whole = np.mean([np.mean(STRUCTURE[law](e, 0) ** 2) for e in logs(commanded_readings(6, 5.0))])
-    assert explained.mean > 0.5 * whole, (explained.mean, whole)
-
-
-def test_what_differs_from_trial_to_trial_is_not():
-    """A slow drift, another in every trial, repeats with nothing."""
-    waves = np.random.default_rng(3).uniform(0.0, 6.0, 6)
-    explained = regressed(lambda logged, k: np.sin(0.9 * logged.time + waves[k]))
-    assert explained.mean < 0.2
+    whole = np.mean([np.mean(STRUCTURE[law](e, 0) ** 2) for e in logs(readings())])
+    assert regressed(STRUCTURE[law]).mean > 0.5 * whole
 
 
 def test_the_bound_is_an_upper_one_that_narrows_with_data():
@@ -252,7 +228,7 @@ def test_the_bound_is_an_upper_one_that_narrows_with_data():
 
 def judged(scale=1.0, unseen=1.0, seen=True, number=6, stated=None, law=None):
     """Of true trials, with residuals of so many floors: in fitted readings and in others."""
-    trials = commanded_readings(number, 5.0)
+    trials = readings(number)
     logged, known = logs(trials), floors(trials, stated)
     generator = np.random.default_rng(11)
 
@@ -288,87 +264,46 @@ def test_what_is_too_large_or_not_known_is_a_fault(case, fault):
     assert (adequacy.structure is not None) == (fault == "misfit")
 
 
-def test_structure_of_the_size_of_the_noise_is_seen_below_the_limit_of_the_misfit():
+@pytest.mark.parametrize(("tolerance", "fault"), [(None, "explained"), (3.0, None)])
+def test_structure_of_the_size_of_the_noise_is_seen_unless_the_lab_is_content(tolerance, fault):
     law = STRUCTURE["of the speed"]
-    adequacy = judged(law=lambda logged: 0.9 * law(logged, 0))
-    assert {each.fault for each in adequacy.signals.values()} == {"explained"}
-    assert all(each.misfit < 1.5 for each in adequacy.signals.values())
-
-
-def test_a_tolerance_makes_the_same_structure_good_enough():
-    law = STRUCTURE["of the speed"]
-    wide = Stated({name: 3.0 * level for name, level in TRUE.items()})
+    wide = tolerance and Stated({name: tolerance * level for name, level in TRUE.items()})
     adequacy = judged(law=lambda logged: 0.9 * law(logged, 0), stated=wide)
-    assert all(each.fault is None for each in adequacy.signals.values())
+    assert {each.fault for each in adequacy.signals.values()} == {fault}
+    # It lies below the limit of the misfit.
+    assert all(each.misfit < 1.5 for each in adequacy.signals.values())
 
 
 # -- verdicts --------------------------------------------------------------------------------------
 
 
-def in_data_set(trials, **stated):
-    return Dataset("lab", None, tuple(named(trials)), **stated)
-
-
-def test_without_repeat_rest_or_tolerance_nothing_agrees():
-    trials = moving(6)
-    diagnosis = refit(trials, STATION)
-    assert diagnosis.verdict == "undecidable"
-    assert "neither a repeat, a rest segment nor a tolerance" in diagnosis.sentence
-    assert "[tolerance], " in diagnosis.sentence and "_mm = a number in mm" in diagnosis.sentence
+def test_what_neither_repeats_nor_rests_agrees_by_a_tolerance_alone():
+    """Trials that always move, and exact sensors at rest."""
     stated = {name: 2.0 * level for name, level in TRUE.items()}
-    diagnosis = refit(in_data_set(trials, tolerance=stated), STATION)
-    assert diagnosis.verdict == "agrees"
-    assert "within 0.0493 mm in contraction" in diagnosis.sentence
+    exact = [Plant(STATION).simulate(each, noise=False) for each in commanded(4)]
+    for trials in (moving(6), exact):
+        open_, content = (
+            refit(Dataset("lab", None, tuple(named(trials)), tolerance=tolerance), STATION)
+            for tolerance in ({}, stated)
+        )
+        assert (open_.verdict, content.verdict) == ("undecidable", "agrees")
+        assert "neither a repeat, a rest segment nor a tolerance" in open_.sentence
+        assert "[tolerance], " in open_.sentence and "_mm = a number in mm" in open_.sentence
+        assert "within 0.0493 mm in contraction" in content.sentence
 
 
-def test_an_exact_sensor_agrees_by_a_tolerance_alone():
-    silent = [Plant(STATION).simulate(each, noise=False) for each in commanded(4)]
-    assert refit(silent, STATION).verdict == "undecidable"
-    diagnosis = refit(
-        in_data_set(silent, tolerance={name: 2 * level for name, level in TRUE.items()}),
-        STATION,
-    )
-    assert diagnosis.verdict == "agrees"
-
-
-@pytest.mark.parametrize("case", [pytest.param("hysteresis", marks=pytest.mark.campaign), "bump"])
-def test_a_refit_alone_does_not_call_a_wrong_structure_right(case):
-    trials = measured(
-        STATION.with_effects({"hysteresis": {"force_n": 12.0, "distance_mm": 1.0}})
-        if case == "hysteresis"
-        else STATION.with_effects(
-            {
-                "residual_force_of_contraction": {"first_mm": 0.0, "reach_mm": 64.0}
-                | {f"h{k}_n": 20.0 * (k == 3) for k in range(9)}
-            }
-        ),
-        6,
-    )
-    diagnosis = refit(trials, STATION)
+@pytest.mark.campaign
+@pytest.mark.parametrize("hidden", [HYSTERESIS, BUMP], ids=["hysteresis", "bump"])
+def test_a_refit_alone_does_not_call_a_wrong_structure_right(hidden):
+    (effect, table), *_ = hidden.items()
+    twice = {name: value * (1 + name.endswith("_n")) for name, value in table.items()}
+    diagnosis = refit(measured(STATION.with_effects({effect: twice}), 6), STATION)
     assert diagnosis.verdict == "unknown"
     assert "parameters alone do not explain that" in diagnosis.sentence
     assert "noise floors" in diagnosis.sentence
 
 
-def test_trials_that_do_not_hold_the_parameters_cannot_tell():
-    diagnosis = diagnose(measured(STATION.replace(OFF), 3), STATION, propose=False)
-    assert diagnosis.verdict == "undecidable"
-    assert "do not determine the parameters" in diagnosis.sentence
-    assert diagnose(measured(STATION.replace(OFF), 6), STATION, propose=False).verdict == (
-        "parameters"
-    )
-
-
-def test_the_answer_says_how_many_floors_are_left():
-    diagnosis = diagnosed("nothing")
-    assert set(diagnosis.adequacy) == set(diagnosis.gap)
-    for judgement in diagnosis.adequacy.values():
-        assert isinstance(judgement, Judgement) and judgement.fault is None
-        assert judgement.misfit == pytest.approx(1.0, abs=0.3)
-    assert diagnosis.document()["adequacy"]["load_n"]["source"] == "rest segments"
-
-
-# -- folds, words ----------------------------------------------------------------------------------
+# -- folds, signals --------------------------------------------------------------------------------
 
 
 def test_pieces_are_left_out_by_whole_files_or_in_contiguous_blocks():
@@ -379,56 +314,10 @@ def test_pieces_are_left_out_by_whole_files_or_in_contiguous_blocks():
     assert folds(9, [str(k) for k in range(9)]) == folds(9)
 
 
-def test_pieces_are_not_called_trials():
-    diagnosis = diagnosed("nothing")
-    pieces = replace(
-        diagnosis, trials=tuple(replace(each, file="long.csv") for each in diagnosis.trials)
-    )
-    assert "this trial (in 3 pieces)" in sentence(pieces)
-
-
-def test_the_headline_names_a_limit_a_rough_fit_and_what_got_worse():
-    diagnosis = diagnosed("hysteresis")
-    (effect,) = diagnosis.effects
-    known = {
-        name: replace(each, limit="upper" if name == "force_n" else "")
-        for name, each in effect.parameters.items()
-    }
-    said = sentence(
-        replace(
-            diagnosis,
-            effects=(replace(effect, parameters=known),),
-            converged=False,
-            worsened=(("load_n",), ("run_2.csv",)),
-        )
-    )
-    assert "N (at its upper limit)" in said
-    assert "the fit did not converge, so its values are rough" in said
-    assert "but it fits load (" in said and "and run_2.csv worse than the model as given" in said
-
-
-def test_intervals_stay_within_what_the_fit_allows():
-    for name in ("hysteresis", "parameters"):
-        diagnosis = diagnosed(name)
-        for effect in diagnosis.effects:
-            for path, each in effect.parameters.items():
-                if each.low is not None:
-                    assert each.low >= 0.0, path
-
-
-def test_a_signal_that_got_worse_is_named_and_noise_is_not():
-    records = diagnosed("nothing").trials
-    sizes = {f"{name}": 1.0 for name in ()} | {
-        column: level
-        for column, level in zip(
-            ("contraction_mm", "rotation_deg", "load_n", "pressure_kpa"), LEVELS, strict=True
-        )
-    }
+def test_a_signal_that_got_worse_is_named_and_noise_is_not(example):
+    records = [replace(each, before=each.after) for each in example.trials]
+    sizes = dict(zip(records[0].columns, LEVELS, strict=True))
     assert worsened(records, sizes, 0) == ((), ())
-    worse = []
-    for record in records:
-        after = record.after.copy()
-        after[:, 2] += 2.0 * LEVELS[2]
-        worse.append(replace(record, after=after))
-    signals, trials = worsened(worse, sizes, 0)
-    assert signals == ("load_n",) and set(trials) == {record.name for record in records}
+    shift = 2.0 * LEVELS * (np.array(records[0].columns) == "load_n")
+    worse = [replace(each, after=each.after + shift) for each in records]
+    assert worsened(worse, sizes, 0) == (("load_n",), tuple(each.name for each in records))

@@ -1,170 +1,17 @@
-"""Verdicts: each where it belongs, with what it must bring along."""
+"""Verdicts: each where it belongs, and an unknown with the figure that is beyond its limit."""
 
 from dataclasses import replace
-from functools import cache
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from pma_gym.data.trial import Trial
 from pma_gym.discovery.report.verdict_text import sentence
 from pma_gym.discovery.screening.autocorrelation import SURE, AutocorrelationTest
 from pma_gym.discovery.verdict import decision, unknown
 from pma_gym.discovery.verdict.adequacy import Adequacy
 from pma_gym.discovery.verdict.residual_fraction import ResidualFraction
 from pma_gym.discovery.verdict.unknown import Reason
-from pma_gym.discovery.workflow import diagnose
-from pma_gym.plant.plant import Plant
-from tests.discovery.laboratory import (
-    LEVELS,
-    OFF,
-    STATION,
-    commanded,
-    diagnosed,
-    laboratory,
-    measured,
-)
-
-
-@cache
-def standing(number=2):
-    """The diagnosis of trials whose commands never change."""
-    plant = Plant(STATION.replace(OFF))
-    simulated = []
-    for k, trial in enumerate(commanded(number)):
-        held = {name: np.full(len(trial), row[0]) for name, row in trial.commands.items()}
-        simulated.append(plant.simulate(Trial(trial.time, held), seed=k))
-    return diagnose(simulated, STATION)
-
-
-def test_the_true_model_agrees():
-    diagnosis = diagnosed("nothing")
-    assert diagnosis.verdict == "agrees"
-    assert diagnosis.effects == () and diagnosis.law is None
-    assert diagnosis.model == diagnosis.given
-    assert "agrees" in diagnosis.sentence
-
-
-@pytest.mark.parametrize("seed", [5, 6, 7])
-def test_the_true_model_agrees_whatever_the_noise(seed):
-    diagnosis = diagnose(measured(STATION, 4, rate=32.0, seed=seed), STATION, propose=False)
-    assert diagnosis.verdict == "agrees"
-    assert not diagnosis.where or min(place.p_value for place in diagnosis.where) > 1e-4
-
-
-def test_parameters_that_are_off_are_named():
-    # Of three trials, one of each kind, two do not hold the parameters for the third.
-    diagnosis = diagnosed("parameters", 6)
-    assert diagnosis.verdict == "parameters"
-    assert diagnosis.effects == ()
-    for path, truth in OFF.items():
-        moved = diagnosis.parameters[path]
-        assert moved.significant
-        assert moved.start == pytest.approx(_given(path))
-        half = 0.5 * (moved.now.high - moved.now.low)
-        assert abs(moved.now.value - truth) < 2.0 * half
-        assert path in diagnosis.sentence
-    assert diagnosis.model.values_in_files("drive")["gain_n_per_v"] == pytest.approx(
-        101.0, rel=2e-3
-    )
-
-
-def test_only_what_moved_is_significant():
-    diagnosis = diagnosed("parameters")
-    significant = {path for path, moved in diagnosis.parameters.items() if moved.significant}
-    assert set(OFF) <= significant
-    assert len(significant) <= len(OFF) + 1
-
-
-def test_intervals_cover_the_truth():
-    """Of all the parameters that moved, over several data sets, some 95 %."""
-    covered = []
-    for seed in (11, 12, 13, 14):
-        trials = measured(STATION.replace(OFF), 4, rate=32.0, seed=seed)
-        diagnosis = diagnose(trials, STATION, propose=False)
-        for path, truth in OFF.items():
-            now = diagnosis.parameters[path].now
-            covered.append(now.low <= truth <= now.high)
-    assert sum(covered) >= 6
-
-
-def test_hysteresis_is_named_with_its_size():
-    diagnosis = diagnosed("hysteresis")
-    assert diagnosis.verdict == "effect"
-    effect = diagnosis.effects[0]
-    assert effect.name == "hysteresis"
-    assert len(diagnosis.effects) == 1
-    assert effect.p_value <= 0.005
-    for name, truth in (("force_n", 6.0), ("distance_mm", 1.0)):
-        estimate = effect.parameters[name]
-        assert estimate.low < estimate.value < estimate.high
-        error = (estimate.high - estimate.low) / 3.92
-        assert abs(estimate.value - truth) < 3.0 * error
-    assert "hysteresis" in diagnosis.sentence
-    assert diagnosis.candidates[0].name == "hysteresis"
-    assert diagnosis.candidates[0].why == "added to the model"
-    assert diagnosis.candidates[0].held_out_gain > 0.0
-
-
-def test_an_effect_closes_the_gap_on_trials_it_has_not_seen():
-    diagnosis = diagnosed("hysteresis")
-    for gap in diagnosis.gap.values():
-        assert gap.held_out
-    for signal in ("contraction_mm", "rotation_deg"):
-        gap = diagnosis.gap[signal]
-        assert gap.after < 0.5 * gap.parameters
-    load = diagnosis.gap["load_n"]
-    assert load.before > 5 * load.after
-    assert load.after == pytest.approx(load.floor, rel=0.1)
-
-
-@pytest.mark.campaign
-def test_two_effects_are_both_named():
-    diagnosis = diagnosed("pair")
-    assert diagnosis.verdict == "effect"
-    assert {effect.name for effect in diagnosis.effects} == {"hysteresis", "regulator_delay"}
-    delay = next(each for each in diagnosis.effects if each.name == "regulator_delay")
-    assert delay.parameters["delay_ms"].value == pytest.approx(20.0, abs=2.0)
-
-
-def test_what_never_moves_decides_nothing():
-    diagnosis = standing()
-    assert diagnosis.verdict == "undecidable"
-    assert diagnosis.next_experiment is not None
-    assert diagnosis.next_experiment.excitation in diagnosis.sentence
-    assert diagnosis.next_experiment.separates
-    moves = diagnosis.next_experiment.trial.commands
-    assert any(np.ptp(row) > 0.0 for row in moves.values())
-    assert len(diagnosis.not_detectable) > 10
-
-
-def test_what_stands_still_does_not_identify_what_moves():
-    diagnosis = standing()
-    assert "damping.contracting_n_s_per_mm" in diagnosis.not_identifiable
-    assert all(diagnosis.not_identifiable.values())
-
-
-def test_floors_are_the_sensors_noise():
-    diagnosis = diagnosed("nothing", 4, 128.0)
-    factors = (1e-3, np.pi / 180.0, 1.0, 1e3)
-    for floor, level, factor in zip(diagnosis.floors.values(), LEVELS, factors, strict=True):
-        assert floor.value * factor == pytest.approx(level, rel=0.25)
-
-
-def test_an_amended_model_carries_its_intervals():
-    diagnosis = diagnosed("hysteresis")
-    note = diagnosis.model.notes["hysteresis.force_n"]
-    estimate = diagnosis.effects[0].parameters["force_n"]
-    assert (note.low, note.high) == pytest.approx((estimate.low, estimate.high))
-
-
-def found_unseen(with_it, without):
-    seen = (
-        None if each is None else SimpleNamespace(deviance=np.array(each))
-        for each in (with_it, without)
-    )
-    return SimpleNamespace(**dict(zip(("unseen", "unseen_without"), seen, strict=True)))
 
 
 @pytest.mark.parametrize(
@@ -178,14 +25,12 @@ def found_unseen(with_it, without):
     ],
 )
 def test_trials_left_out_bear_an_effect_out_together_or_in_most_folds(with_it, without, borne_out):
-    assert decision._confirmed(found_unseen(with_it, without)) == borne_out
-
-
-def test_an_effect_that_is_not_borne_out_is_said_to_be_likeliest():
-    diagnosis = replace(diagnosed("hysteresis"), verdict="undecidable")
-    said = sentence(diagnosis)
-    assert "misses something, hysteresis" in said and "most likely" in said
-    assert "left out of these 3 trials does not confirm it" in said
+    unseen, unseen_without = (
+        None if each is None else SimpleNamespace(deviance=np.array(each))
+        for each in (with_it, without)
+    )
+    findings = SimpleNamespace(unseen=unseen, unseen_without=unseen_without)
+    assert decision._confirmed(findings) == borne_out
 
 
 UNKNOWN = {
@@ -256,12 +101,45 @@ UNKNOWN = {
 }  # fmt: skip
 
 
+@pytest.fixture(scope="module")
+def answer(example):
+    """An answer of three files that names Coulomb friction and leaves nothing undetected."""
+    files = tuple(replace(each, file=each.name) for each in example.trials)
+    named, *others = example.candidates
+    return replace(
+        example,
+        trials=files,
+        candidates=(replace(named, why="added to the model"), *others),
+        not_detectable=(),
+        next_experiment=None,
+    )
+
+
 @pytest.mark.parametrize(("reason", "said"), UNKNOWN.values(), ids=UNKNOWN)
-def test_an_unknown_says_what_the_best_leave_and_which_figure_is_beyond_its_limit(reason, said):
-    diagnosis = replace(diagnosed("hysteresis"), verdict="unknown", tones={"load_n": 12.5})
-    head = "Something is missing in model lab that no effect of the catalogue carries: "
+def test_an_unknown_says_what_the_best_leave_and_which_figure_is_beyond_its_limit(
+    reason, said, answer
+):
+    diagnosis = replace(answer, verdict="unknown", tones={"load_n": 12.5})
+    head = "Something is missing in model serres2008 that no effect of the catalogue carries: "
     tone = " What is left of load oscillates at 12.5 Hz."
     assert sentence(diagnosis, reason) == head + said + tone
+
+
+def test_the_headline_says_what_is_not_sure(answer):
+    """What trials left out do not confirm, a limit, a rough fit, what got worse, pieces."""
+    said = sentence(replace(answer, verdict="undecidable"))
+    assert "misses something, Coulomb friction" in said and "most likely" in said
+    assert "left out of these 3 trials does not confirm it" in said
+    (effect,) = answer.effects
+    dynamic = replace(effect.parameters["dynamic_n"], limit="upper")
+    limited = replace(effect, parameters=effect.parameters | {"dynamic_n": dynamic})
+    worse = ("load_n",), ("run_2.csv",)
+    said = sentence(replace(answer, effects=(limited,), converged=False, worsened=worse))
+    assert "N (at its upper limit)" in said
+    assert "the fit did not converge, so its values are rough" in said
+    assert "but it fits load (" in said and "and run_2.csv worse than the model as given" in said
+    pieces = tuple(replace(each, file="long.csv") for each in answer.trials)
+    assert "this trial (in 3 pieces)" in sentence(replace(answer, trials=pieces))
 
 
 def made_up(chosen=("creep",), *, gate=True, missing=False, gain=200.0):
@@ -307,13 +185,12 @@ def same_size(monkeypatch):
 
 
 def test_what_is_within_its_limits_is_not_unknown(same_size):
-    left, law = (
-        ResidualFraction(unknown.MOST_LEFT, unknown.MOST_AUTOCORRELATED),
-        SimpleNamespace(gain=260.0),
-    )
-    diagnosis = made_up()
-    assert unknown.why_unknown(diagnosis, left, [law]) is None
-    assert decision.verdict_of(diagnosis, None, (), False, False) == "effect"
+    left = ResidualFraction(unknown.MOST_LEFT, unknown.MOST_AUTOCORRELATED)
+    assert unknown.why_unknown(made_up(), left, [SimpleNamespace(gain=260.0)]) is None
+    assert decision.verdict_of(made_up(), None, (), False, False) == "effect"
+    # Nothing added and nothing slow is for other verdicts.
+    assert unknown.why_unknown(made_up(()), ResidualFraction(0.0, 0.0), []) is None
+    assert unknown.why_unknown(made_up((), gate=False), ResidualFraction(1.0, 1.0), []) is None
 
 
 @pytest.mark.parametrize(
@@ -331,11 +208,14 @@ def test_the_first_figure_beyond_its_limit_is_the_reason(same_size, left, why, f
     assert decision.verdict_of(diagnosis, reason, (), False, False) == "unknown"
 
 
-def test_a_size_that_scatters_is_told_by_where_it_scatters_most(same_size):
+def test_a_size_that_scatters_is_named_with_where_it_scatters_most(same_size):
     same_size[1].update(pressure=0.2, contraction=0.5)
-    reason = unknown.why_unknown(made_up(("creep", "filling")), ResidualFraction(0.01, 0.0), [])
+    both = made_up(("creep", "filling"))
+    reason = unknown.why_unknown(both, ResidualFraction(0.01, 0.0), [])
     assert (reason.why, reason.of, reason.by) == ("scatters", "filling", "contraction")
     assert (reason.figure, reason.limit) == (0.5, unknown.MOST_SPREAD)
+    widest = [unknown.widest_scatter(each) for each in (both, made_up(("creep",)), made_up(()))]
+    assert widest == [0.5, 0.12, 0.0]
 
 
 @pytest.mark.parametrize(("gain", "limit"), [(200.0, 260.0), (600.0, 690.0)])
@@ -347,7 +227,7 @@ def test_a_law_that_explains_more_is_named_with_both_gains(same_size, gain, limi
 
 
 @pytest.mark.parametrize(("gate", "nearest"), [(True, "creep"), (False, "lvdt_error")])
-def test_what_remembers_itself_with_nothing_added_is_told_by_its_surest_signal(
+def test_what_remembers_itself_with_nothing_added_is_named_by_its_surest_signal(
     monkeypatch, gate, nearest
 ):
     kept = {"contraction": 7.0, "rotation": 30.0, "load": 40.0, "pressure": 9.0}
@@ -365,46 +245,6 @@ def test_what_remembers_itself_with_nothing_added_is_told_by_its_surest_signal(
     assert (reason.figure, reason.limit) == (30.0, SURE)
     assert (reason.effects, reason.nearest) == ((), nearest)
     assert reason.leaves == pytest.approx(0.8)
-
-
-def test_nothing_added_and_nothing_slow_is_for_other_verdicts(same_size):
-    assert unknown.why_unknown(made_up(()), ResidualFraction(0.0, 0.0), []) is None
-    assert unknown.why_unknown(made_up((), gate=False), ResidualFraction(1.0, 1.0), []) is None
-
-
-def test_nothing_is_held_out_of_a_single_trial():
-    diagnosis = diagnosed("nothing", 1)
-    assert all(not record.held_out for record in diagnosis.trials)
-
-
-def test_every_trial_has_its_curves():
-    trials = laboratory("hysteresis")[0]
-    diagnosis = diagnosed("hysteresis")
-    assert len(diagnosis.trials) == len(trials)
-    for record, trial in zip(diagnosis.trials, trials, strict=True):
-        shape = (len(trial), 4)
-        assert record.measured.shape == record.before.shape == record.after.shape == shape
-        assert np.array_equal(record.measured[:, 2], trial.measurements["load"])
-
-
-def test_every_candidate_is_accounted_for():
-    diagnosis = diagnosed("hysteresis")
-    assert len(diagnosis.candidates) > 25
-    assert len({each.name for each in diagnosis.candidates}) == len(diagnosis.candidates)
-    assert all(each.why for each in diagnosis.candidates)
-    assert set(diagnosis.not_detectable) <= {each.name for each in diagnosis.candidates}
-
-
-def _given(path):
-    effect, _, file_key = path.partition(".")
-    return STATION.values_in_files(effect)[file_key]
-
-
-def test_the_widest_scatter_is_over_all_effects_and_conditions(same_size):
-    same_size[1].update(contraction=0.5)
-    assert unknown.widest_scatter(made_up(("creep", "filling"))) == 0.5
-    assert unknown.widest_scatter(made_up(("creep",))) == 0.12
-    assert unknown.widest_scatter(made_up(())) == 0.0
 
 
 def test_a_scatter_that_slopes_alone_tell_is_not_believed_where_nothing_is_left(same_size):
