@@ -3,10 +3,9 @@
 import numpy as np
 import pytest
 
-from pma_gym.envs import PMAEnv, PMAVectorEnv
-from pma_gym.plant.model import load_model, shipped_models
+from pma_gym.envs import PMAVectorEnv
+from pma_gym.plant.model import load_model
 from pma_gym.plant.sensors import noise_levels
-from pma_gym.tasks import REWARDS, TASKS
 
 EPISODE = 51
 """Steps of a displacement at 10 Hz."""
@@ -18,8 +17,7 @@ SEVERAL = {
 """Nearly everything at once."""
 
 
-@pytest.mark.parametrize("count", [1, 2, 15, 16, 17, 33])
-@pytest.mark.parametrize("threads", [1, 2])
+@pytest.mark.parametrize(("count", "threads"), [(1, 1), (16, 1), (17, 2), (33, 2)])
 def test_a_batch_is_gymnasiums_own_loop(twins, fragile, count, threads):
     both = twins(count, model=fragile, batch={"threads": threads})
     both.reset(seed=5)
@@ -28,8 +26,7 @@ def test_a_batch_is_gymnasiums_own_loop(twins, fragile, count, threads):
     assert both.ends[0].sum() > 2 * count
 
 
-@pytest.mark.parametrize("options", [{}, {"randomisation": "varied", "noise": False}], ids=str)
-@pytest.mark.parametrize("threads", [2, 5])
+@pytest.mark.parametrize(("threads", "options"), [(2, {}), (5, {"randomisation": "varied"})])
 def test_threads_begin_many_episodes_as_one_does(monkeypatch, threads, options):
     made = {"model": "serres2008", "control_rate_hz": 10.0, "pressure_kpa": "random"}
     one, many = (
@@ -54,7 +51,7 @@ def test_threads_begin_many_episodes_as_one_does(monkeypatch, threads, options):
         np.testing.assert_array_equal(one.step(actions)[0], many.step(actions)[0])
 
 
-@pytest.mark.parametrize("width", [4, 8, 16])
+@pytest.mark.parametrize("width", [4, 16])
 def test_the_lanes_of_any_processor_give_the_same_bits(monkeypatch, twins, fragile, width):
     monkeypatch.setattr("pma_gym.engine.engine_memory.simd_lanes", lambda single: width)
     both = twins(18, model=fragile, randomisation="varied")
@@ -65,8 +62,7 @@ def test_the_lanes_of_any_processor_give_the_same_bits(monkeypatch, twins, fragi
     assert both.ends[0].sum() > 18
 
 
-@pytest.mark.parametrize("mode", ["NextStep", "SameStep"])
-@pytest.mark.parametrize("task", TASKS)
+@pytest.mark.parametrize(("task", "mode"), [("displacement", "NextStep"), ("rotation", "SameStep")])
 def test_episodes_follow_each_other_as_gymnasium_has_it(twins, fragile, mode, task):
     both = twins(5, task, autoreset_mode=mode, model=fragile, pressure_kpa="random")
     both.reset(seed=[3, 1, 4, 1, 5])
@@ -82,14 +78,20 @@ def test_episodes_follow_each_other_as_gymnasium_has_it(twins, fragile, mode, ta
     both.step()
 
 
-@pytest.mark.parametrize("last", [500.0, [500.0]])
-def test_pressures_of_some_episodes_are_for_those_alone(last):
+def test_pressures_of_some_episodes_are_for_those_alone():
     made = {"model": "serres2008", "control_rate_hz": 10.0}
-    envs = PMAVectorEnv(3, pressures_kpa=[200.0, 300.0, last], **made)
+    envs = PMAVectorEnv(3, pressures_kpa=[200.0, 300.0, [500.0]], **made)
     for options, wanted in (
         ({"pressure_kpa": 444.0}, [444.0] * 3),
         ({"pressures_kpa": [250.0, [350.0], 450.0]}, [250.0, 350.0, 450.0]),
         ({}, [200.0, 300.0, 500.0]),
+        (
+            {
+                "pressures_kpa": [500, 350, 450],
+                "reset_mask": np.array([False, True, True]),
+            },
+            [200.0, 350.0, 450.0],
+        ),
     ):
         envs.reset(seed=1, options=options)
         assert envs.station_info()["pressure_kpa"] == pytest.approx(wanted)
@@ -109,12 +111,7 @@ def test_without_autoreset_a_mask_says_who_begins_anew(twins, fragile):
 
 @pytest.mark.parametrize(
     ("name", "randomisation"),
-    [
-        *(("serres2008", how) for how in ("none", "intervals", "varied")),
-        *(("station", how) for how in ("intervals", "varied")),
-        *(("cascade", how) for how in ("none", "varied")),
-        ("chou_hannaford", "intervals"),
-    ],
+    [("serres2008", "intervals"), ("station", "varied"), ("cascade", "none")],
 )
 def test_models_and_their_randomisation(twins, name, randomisation):
     options = {"model": name, "randomisation": randomisation, "pressure_kpa": "random"}
@@ -126,23 +123,9 @@ def test_models_and_their_randomisation(twins, name, randomisation):
 
 
 @pytest.mark.parametrize(
-    ("reward", "scale"), [*zip(sorted(REWARDS), [1e-3, 0.5, 7.0, 2.0], strict=True)]
-)
-def test_rewards(twins, reward, scale):
-    both = twins(3, reward=reward, reward_scale=scale)
-    both.reset(seed=0)
-    for _ in range(20):
-        both.step(-0.9, -0.7)
-
-
-@pytest.mark.parametrize(
     "options",
     [
-        {"noise": False, "preview": 4},
-        {"action_delay_s": 0.3, "observation_delay_s": 0.2, "history": 2},
-        {"regulator_action": True, "action_delay_s": 0.1},
-        {"control_rate_hz": 100.0, "task": "rotation"},
-        {"control_rate_hz": 384.0 / 5.0},
+        {"noise": False, "preview": 4, "control_rate_hz": 384.0 / 5.0},
         SEVERAL | {"task": "rotation", "model": "station"},
     ],
     ids=",".join,
@@ -154,10 +137,9 @@ def test_options(twins, options):
         both.step(-0.9, -0.4)
 
 
-@pytest.mark.parametrize("mode", ["NextStep", "SameStep"])
-def test_each_environment_has_its_own_pressures(twins, mode):
+def test_each_environment_has_its_own_pressures(twins):
     pressures = [200.0, [300.0, 400], "random", 575]
-    both = twins(4, autoreset_mode=mode, pressures_kpa=pressures)
+    both = twins(4, autoreset_mode="SameStep", pressures_kpa=pressures)
     both.reset(seed=4)
     started = []
     for _ in range(4 * EPISODE + 10):
@@ -168,20 +150,7 @@ def test_each_environment_has_its_own_pressures(twins, mode):
     assert set(listed) <= {300.0, 400.0} and len(set(drawn)) > 2
 
 
-def test_pressures_of_one_reset_may_differ_too():
-    envs = PMAVectorEnv(3, model="serres2008")
-    envs.reset(seed=1, options={"pressures_kpa": [200, 300, 400]})
-    assert envs.station_info()["pressure_kpa"] == pytest.approx([200.0, 300.0, 400.0])
-    mask = np.array([False, True, True])
-    envs.reset(options={"pressures_kpa": [500, 350, "random"], "reset_mask": mask})
-    pressures = envs.station_info()["pressure_kpa"]
-    assert pressures[:2] == pytest.approx([200.0, 350.0]) and pressures[2] != pytest.approx(400.0)
-
-
-@pytest.mark.parametrize(
-    ("model", "task"),
-    [*((name, "rotation") for name in sorted(shipped_models())), ("station", "displacement")],
-)
+@pytest.mark.parametrize(("model", "task"), [("station", "rotation"), ("cascade", "displacement")])
 def test_single_precision_is_near(model, task):
     made = {"model": model, "noise": False, "pressure_kpa": "random"}
     envs = [PMAVectorEnv(17, task, precision=p, **made) for p in ("double", "single")]
@@ -213,11 +182,14 @@ def test_single_precision_gives_the_same_bits_in_any_batch():
         np.testing.assert_array_equal(rewards, batches[0][1][:, :count])
 
 
-@pytest.mark.parametrize("mode", ["NextStep", "SameStep"])
-def test_parked_stations_disturb_nobody(model, mode):
+@pytest.mark.parametrize(
+    ("model", "task", "mode"),
+    [("station", "rotation", "NextStep"), ("cascade", "displacement", "SameStep")],
+)
+def test_parked_stations_disturb_nobody(model, task, mode):
     weak = load_model(model).replace({"limits.tension_n": 5.0})
     made = {"noise": False, "pressure_kpa": 300.0}
-    envs = PMAVectorEnv(19, "rotation", model=weak, autoreset_mode=mode, **made)
+    envs = PMAVectorEnv(19, task, model=weak, autoreset_mode=mode, **made)
     envs.reset(seed=0)
     ends = 0
     for _ in range(40):
@@ -230,9 +202,9 @@ def test_parked_stations_disturb_nobody(model, mode):
     assert ends >= 19
 
 
-@pytest.mark.parametrize("count", [17])
-def test_lanes_without_an_environment_never_end(model, count):
-    envs = PMAVectorEnv(count, "rotation", model=model, noise=False)
+def test_lanes_without_an_environment_never_end():
+    count = 17
+    envs = PMAVectorEnv(count, "rotation", model="station", noise=False)
     envs.reset(seed=0)
     for _ in range(30):
         envs.engine.actions[:] = 0.0
@@ -259,15 +231,3 @@ def test_noise_of_a_batch_is_the_models_and_its_environments_own():
         assert np.abs(related).max() < 0.25
     # Nor does a step tell the next.
     assert np.abs((one[1:] * one[:-1]).mean() / one.var()) < 0.03
-
-
-def test_one_environment_is_the_environment():
-    envs, env = PMAVectorEnv(1, model="station"), PMAEnv(model="station")
-    observations, _ = envs.reset(seed=6)
-    np.testing.assert_array_equal(observations[0], env.reset(seed=6)[0])
-    for k in range(100):
-        action = env.action(0.02 * k)
-        observations, rewards, *_ = envs.step(action[None])
-        observation, reward, *_ = env.step(action)
-        np.testing.assert_array_equal(observations[0], observation)
-        assert rewards[0] == reward

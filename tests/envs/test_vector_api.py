@@ -1,9 +1,6 @@
 """Batches as Gymnasium knows them: ids, modes, spaces, seeds, statistics."""
 
 import inspect
-import os
-import subprocess
-import sys
 
 import gymnasium as gym
 import numpy as np
@@ -17,12 +14,11 @@ MADE = {"model": "serres2008", "pressure_kpa": 300, "control_rate_hz": 10.0}
 NAME = "pma_gym/IsokineticDisplacement-v0"
 
 
-@pytest.mark.parametrize("mode", [None, "vector_entry_point"])
 @pytest.mark.parametrize("name", ENVIRONMENTS)
-def test_ids_make_batches(name, mode):
+def test_ids_make_batches(name):
     # An exercise's operator must be played often enough.
     made = MADE | {"control_rate_hz": 50.0} if "Exercise" in name else MADE
-    envs = gym.make_vec(name, 5, vectorization_mode=mode, threads=2, **made)
+    envs = gym.make_vec(name, 5, threads=2, **made)
     assert type(envs) is PMAVectorEnv
     assert envs.num_envs == 5 and envs.task.name == ENVIRONMENTS[name]
     assert envs.spec is not None and envs.spec.id == name
@@ -111,15 +107,6 @@ def test_without_a_seed_environments_and_episodes_differ(batch):
         assert all(np.any(one != another) for one, another in zip(first, other, strict=True))
 
 
-def test_no_info_while_no_episode_ends(batch):
-    envs = batch(6)
-    assert envs.reset(seed=0)[1] == {}
-    for k in range(110):
-        *_, terminated, truncated, info = envs.step(np.full((6, 1), -0.9))
-        assert (k in (50, 102)) == bool(info) == bool(truncated.any())
-        assert not terminated.any()
-
-
 def test_what_is_returned_stays_as_it_was(batch):
     envs = batch()
     kept = [envs.reset(seed=0)[0]]
@@ -140,26 +127,3 @@ def test_closed_threads_come_back_when_they_are_needed(batch):
     for _ in range(5):
         results = [one.step(np.full((40, 1), -0.4)) for one in (envs, serial)]
         np.testing.assert_array_equal(results[0][0], results[1][0])
-
-
-def test_numbers_of_numpy_are_numbers():
-    envs = PMAVectorEnv(np.int64(2), threads=np.int32(1), pressures_kpa=np.array([200.0, 300]))
-    assert envs.reset(seed=np.int64(3))[0].shape == (2, 7)
-    np.testing.assert_array_equal(envs.reset(seed=3)[0], envs.reset(seed=np.array([3, 4]))[0])
-
-
-def test_a_cache_that_cannot_be_written_is_no_obstacle(tmp_path):
-    blocked = tmp_path / "file"
-    blocked.write_text("no folder")
-    code = (
-        "import warnings; warnings.simplefilter('always')\n"
-        "import numpy as np; from pma_gym.envs import PMAVectorEnv\n"
-        "envs = PMAVectorEnv(2, model='cascade'); envs.reset(seed=0)\n"
-        "print(envs.step(np.zeros((2, 1)))[0].shape)"
-    )
-    run = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, check=True,
-        env=os.environ | {"PMA_GYM_CACHE": str(blocked / "cache")},
-    )  # fmt: skip
-    assert run.stdout == "(2, 7)\n"
-    assert "set PMA_GYM_CACHE" in run.stderr
