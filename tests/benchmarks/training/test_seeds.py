@@ -27,7 +27,7 @@ def weights(path):
 
 
 def test_every_seed_has_its_folder_and_its_policy(preset, tmp_path):
-    order, console = Order(preset("ppo", n_timesteps=128), seed=3), Console(file=io.StringIO())
+    order, console = Order(preset("ppo", n_timesteps=128), seed=3), Console(file=io.StringIO(), width=500)
     trainings = [(replace(order, seed=seed), tmp_path / f"seed-{seed}") for seed in (3, 4)]
     third, fourth = train_policies.run_seeds(trainings, ThisProcess(), console)
     assert third.parent.name == "seed-3" and fourth.parent.name == "seed-4"
