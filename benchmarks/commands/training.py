@@ -11,11 +11,7 @@ import typer
 
 from benchmarks.commands.options import (
     INTERRUPTED,
-    LOCAL,
     RESULTS,
-    ExecutorOption,
-    Jobs,
-    chosen_executor,
     refuse,
 )
 
@@ -41,7 +37,8 @@ def train(
     preset: Annotated[str, typer.Option(help="A preset, or a .yml file's path.")] = "increment",
     seed: Annotated[int, typer.Option(min=0, help="Same seed, same policy.")] = 0,
     seeds: Annotated[
-        int, typer.Option(min=1, help="So many seeds from --seed on, a folder each.")
+        int,
+        typer.Option(min=1, help="So many seeds from --seed on, in turn, a folder each."),
     ] = 1,
     steps: Annotated[
         int | None, typer.Option(min=1, help="Control steps; the preset's if not given.")
@@ -52,30 +49,24 @@ def train(
     ] = None,
     threads: Annotated[int, typer.Option(min=1, help="Of PyTorch and the environments.")] = 1,
     ship: Annotated[bool, typer.Option("--ship", help="Put the policy into the package.")] = False,
-    jobs: Jobs = 1,
-    executor: ExecutorOption = LOCAL,
 ) -> None:
     """Train policies on stations of no suite; an interrupted training goes on."""
     usual = RESULTS / "training" / f"{Path(preset).stem}-{algo}"
     folder = out or usual / f"{task}-{seed}"
     with _failures_in_words(folder):
         from benchmarks.training.preset import PresetError
-        from benchmarks.training.train_policies import ordered, run_seeds, run_train
+        from benchmarks.training.train_policies import ordered, run_train
         from pma_gym.terminal import SafeConsole
 
-        places = chosen_executor(executor, jobs)
         if folder.exists() and not folder.is_dir():
             raise PresetError(f"--out {folder} is a file; name a folder")
-        order = ordered(algo, task, preset, seed, steps, threads)
         if ship and seeds > 1:
             raise PresetError(f"--ship takes one seed, got --seeds {seeds}; name it by --seed")
-        if seeds == 1 and executor is LOCAL:
-            run_train(order, folder, SafeConsole(), ship)
-            return
-        numbers = range(seed, seed + seeds)
-        folders = [out / f"seed-{n}" if out else usual / f"{task}-{n}" for n in numbers]
-        trainings = [(replace(order, seed=n), f) for n, f in zip(numbers, folders, strict=True)]
-        run_seeds(trainings, places, SafeConsole())
+        order = ordered(algo, task, preset, seed, steps, threads)
+        for number in range(seed, seed + seeds):
+            if seeds > 1:
+                folder = out / f"seed-{number}" if out else usual / f"{task}-{number}"
+            run_train(replace(order, seed=number), folder, SafeConsole(), ship)
 
 
 @contextmanager
@@ -105,7 +96,7 @@ def _failures_in_words(folder: Path) -> Iterator[None]:
         raise typer.Exit(1) from None
     except KeyboardInterrupt:
         print(
-            f"Interrupted; run it again, it goes on from {folder}/checkpoint.zip",
+            "Interrupted; run it again, it goes on from the checkpoint of the last validation",
             file=sys.stderr,
         )
         raise typer.Exit(INTERRUPTED) from None

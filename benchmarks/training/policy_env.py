@@ -86,6 +86,8 @@ class PolicyEnv(gym.Wrapper[NDArray[np.float32], NDArray[np.float32], NDArray[An
                 f"view must be of kind tracking, got {self.adapter.view.kind}; on the "
                 "environment's own view train with a script of your own, see docs/train-a-policy.md"
             )
+        # Refuses a station or a task that the view or the base is not made for.
+        self.adapter.reset(rig.reference, rig.station)
         entries = len(self.adapter.view.rows(rig.station, self.adapter.form.base))
         self.observation_space = spaces.Box(-BOUND, BOUND, (entries,), np.float32)
         self.action_space = spaces.Box(-1.0, 1.0, (1,), np.float32)

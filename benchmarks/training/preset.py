@@ -61,10 +61,8 @@ class Preset:
 
     @cached_property
     def env(self) -> PolicyEnv:
-        """A single environment of it, reset."""
-        env = PolicyEnv(PMAEnv(ENVIRONMENTS[self.environment]), **self.wrapper)
-        env.reset(seed=0)
-        return env
+        """A single environment of it."""
+        return PolicyEnv(PMAEnv(ENVIRONMENTS[self.environment]), **self.wrapper)
 
     @property
     def task(self) -> str:

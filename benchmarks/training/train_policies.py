@@ -1,7 +1,5 @@
 """`python -m benchmarks train`: from a preset to a policy file, with progress, to go on later."""
 
-from collections.abc import Sequence
-from functools import partial
 from pathlib import Path
 
 from rich.console import Console
@@ -14,7 +12,6 @@ from rich.progress import (
     TimeRemainingColumn,
 )
 
-from benchmarks.executors.executor import Executor, run_or_raise
 from benchmarks.training.card import policy_name, policy_of, save_policy
 from benchmarks.training.export import weights_from_state
 from benchmarks.training.preset import PresetError, load_preset
@@ -48,18 +45,16 @@ def ordered(
     return Order(load_preset(preset, algorithm, EXERCISE, task, steps), seed, threads)
 
 
-def run_train(
-    order: Order, out: Path, console: Console | None = None, ship: bool = False
-) -> tuple[Path, str]:
+def run_train(order: Order, out: Path, console: Console, ship: bool = False) -> Path:
     """Train, and write the policy.
 
     Args:
         order: what is to be trained.
         out: folder of the policy, its checkpoint and logs.
-        console: where progress is shown; nowhere if not given.
+        console: where progress is shown.
         ship: write the policy where the package's lie too.
     Returns:
-        The policy's .json file, and a line on it.
+        The policy's .json file.
     Raises:
         CheckpointError: see `train`.
     """
@@ -72,12 +67,12 @@ def run_train(
         TimeElapsedColumn(),
         TimeRemainingColumn(),
     )
-    with Progress(*columns, console=console, transient=True, disable=console is None) as progress:
+    with Progress(*columns, console=console, transient=True) as progress:
         bar = progress.add_task(policy_name(preset), total=preset.n_timesteps)
 
         def on_progress(steps: int, point: Point | None) -> None:
             progress.update(bar, completed=min(steps, preset.n_timesteps))
-            if point is not None and console is not None:
+            if point is not None:
                 broken = f", {point.broken} episodes broke a limit" if point.broken else ""
                 at = f"{point.steps:9d} steps {point.wall_s:6.0f} s"
                 progress.console.print(f"{at}   validation {point.error:.4g} {unit}{broken}")
@@ -87,35 +82,9 @@ def run_train(
     weights = weights_from_state(preset.algorithm, model.policy.state_dict(), activation)
     policy = policy_of(preset, order.seed, weights, model.num_timesteps, curve, best)
     path = save_policy(policy, out, ship)
-    line = (
-        f"{best.error:.4g} {unit} on validation stations after {best.steps} of "
-        f"{model.num_timesteps} steps, {curve[-1].wall_s:.0f} s in all\nPolicy: {path}"
+    console.print(
+        f"Seed {order.seed}: {best.error:.4g} {unit} on validation stations after {best.steps} of "
+        f"{model.num_timesteps} steps, {curve[-1].wall_s:.0f} s in all\nPolicy: {path}",
+        highlight=False,
     )
-    if console is not None:
-        console.print(line)
-    return path, line
-
-
-def run_seeds(
-    trainings: Sequence[tuple[Order, Path]], executor: Executor, console: Console
-) -> list[Path]:
-    """Train several seeds, and write a policy each; one that is interrupted goes on later.
-
-    Args:
-        trainings: what is to be trained, and the folder of its policy, checkpoint and logs.
-        executor: where; on other machines the folders must be the same ones.
-        console: where a line for each is printed.
-    Returns:
-        The policies' .json files.
-    Raises:
-        CheckpointError: see `train`.
-        KeyboardInterrupt: Ctrl-C; the checkpoints stay.
-    """
-    paths = [Path()] * len(trainings)
-
-    def keep(index: int, result: tuple[Path, str]) -> None:
-        paths[index], line = result
-        console.print(f"Seed {trainings[index][0].seed}: {line}", highlight=False)
-
-    run_or_raise([partial(run_train, order, out) for order, out in trainings], executor, keep)
-    return paths
+    return path

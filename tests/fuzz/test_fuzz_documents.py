@@ -226,7 +226,7 @@ def _suites(_, document):
 def _presets(folder, document):
     path = folder / "mine.yml"
     path.write_bytes(yaml.safe_dump(document).encode("utf-8", "replace"))
-    load_preset(str(path), "ppo", next(iter(document)))
+    load_preset(str(path), "ppo", next(iter(document), "none"))
 
 
 def _policies(_, document):
@@ -237,7 +237,8 @@ READERS = {
     "model": (_models, MODEL_TABLES[0], 6),
     "dataset.toml": (_descriptions, DATASETS[0], 1),
     "suite": (_suites, min(SUITE_TABLES, key=lambda table: len(str(table))), 5),
-    "preset": (_presets, PRESET_TABLES[0], 9),
+    # Of its first environment, the one that is read.
+    "preset": (_presets, dict(list(PRESET_TABLES[0].items())[:1]), 3),
     "policy": (_policies, POLICY_TABLES[0], 7),
 }
 

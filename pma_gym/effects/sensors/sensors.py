@@ -17,76 +17,69 @@ def _bandwidth(usual: float) -> Quantity:
     )
 
 
+def _noise(unit: str, most: float, usual: float) -> Quantity:
+    """Bounds of the standard deviation of a sensor's noise, with its usual value.
+
+    The one place of these usual values: a model file states its own.
+    """
+    source = f"{_ASSUMED}: {usual:g} (standard deviation)"
+    return Quantity(unit, 0, most, source, 0.0, usual=usual)
+
+
 class Lvdt(NamedTuple):
     """Displacement of the muscle (contraction)."""
 
     bandwidth: Annotated[float, _bandwidth(100)]
-    noise: Annotated[
-        float, Quantity("mm", 0, 10, f"{_ASSUMED}: 0.02 (standard deviation)", 0.0, usual=0.02)
-    ]
+    noise: Annotated[float, _noise("mm", 10, 0.02)]
 
 
 class LoadCell(NamedTuple):
     """Tension of the cable."""
 
     bandwidth: Annotated[float, _bandwidth(500)]
-    noise: Annotated[
-        float, Quantity("N", 0, 100, f"{_ASSUMED}: 0.5 (standard deviation)", 0.0, usual=0.5)
-    ]
+    noise: Annotated[float, _noise("N", 100, 0.5)]
 
 
 class PressureTransducer(NamedTuple):
     """Gauge pressure in the muscle."""
 
     bandwidth: Annotated[float, _bandwidth(50)]
-    noise: Annotated[
-        float, Quantity("kPa", 0, 100, f"{_ASSUMED}: 0.3 (standard deviation)", 0.0, usual=0.3)
-    ]
+    noise: Annotated[float, _noise("kPa", 100, 0.3)]
 
 
 class Potentiometer(NamedTuple):
     """Angle of the pulley."""
 
     bandwidth: Annotated[float, _bandwidth(200)]
-    noise: Annotated[
-        float, Quantity("deg", 0, 45, f"{_ASSUMED}: 0.1 (standard deviation)", 0.0, usual=0.1)
-    ]
+    noise: Annotated[float, _noise("deg", 45, 0.1)]
 
 
 class Encoder(NamedTuple):
     """Angle of a joint."""
 
     bandwidth: Annotated[float, _bandwidth(1000)]
-    noise: Annotated[
-        float, Quantity("deg", 0, 45, f"{_ASSUMED}: 0.02 (standard deviation)", 0.0, usual=0.02)
-    ]
+    noise: Annotated[float, _noise("deg", 45, 0.02)]
 
 
 class Gyroscope(NamedTuple):
     """Speed of a joint."""
 
     bandwidth: Annotated[float, _bandwidth(200)]
-    noise: Annotated[
-        float, Quantity("rad/s", 0, 1e3, f"{_ASSUMED}: 0.02 (standard deviation)", 0.0, usual=0.02)
-    ]
+    noise: Annotated[float, _noise("rad/s", 1e3, 0.02)]
 
 
 class Tachometer(NamedTuple):
     """Speed of a slide."""
 
     bandwidth: Annotated[float, _bandwidth(200)]
-    noise: Annotated[
-        float, Quantity("mm/s", 0, 1e4, f"{_ASSUMED}: 0.5 (standard deviation)", 0.0, usual=0.5)
-    ]
+    noise: Annotated[float, _noise("mm/s", 1e4, 0.5)]
 
 
 class ForceSensor(NamedTuple):
     """Force at a drive that imposes a motion."""
 
     bandwidth: Annotated[float, _bandwidth(1000)]
-    noise: Annotated[
-        float, Quantity("N", 0, 1e5, f"{_ASSUMED}: 0.5 (standard deviation)", 0.0, usual=0.5)
-    ]
+    noise: Annotated[float, _noise("N", 1e5, 0.5)]
 
 
 def sensor_rate(signal, p):

@@ -1,5 +1,6 @@
 """Policies of exercises: trained as others are, of a kind and with a view of their own."""
 
+import io
 import re
 
 import numpy as np
@@ -8,6 +9,8 @@ import pytest
 pytest.importorskip("stable_baselines3")
 pytest.importorskip("sb3_contrib")
 pytest.importorskip("safetensors")
+
+from rich.console import Console
 
 from benchmarks.training import run
 from benchmarks.training.card import policy_name
@@ -31,7 +34,7 @@ def test_a_training_leaves_a_policy_that_drives_an_exercise(
     monkeypatch.setattr(run, "EVALUATIONS", 1)
     options = {"control_rate_hz": 50.0, "pressure_kpa": 400.0}
     asked = preset(algorithm, environment=EXERCISE, options=options, n_timesteps=256)
-    path, _ = run_train(Order(asked, seed=3), tmp_path)
+    path = run_train(Order(asked, seed=3), tmp_path, Console(file=io.StringIO()))
     assert path.name == f"isokinetic-50hz-{algorithm}.json"
     driven = Policy(path)
     assert driven.file.task == "isokinetic"

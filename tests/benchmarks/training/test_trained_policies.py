@@ -3,7 +3,9 @@
 from dataclasses import replace
 
 import pytest
+from typer.testing import CliRunner
 
+from benchmarks.__main__ import app
 from benchmarks.runner.controller_spec import ControllerError, parse_controllers
 from benchmarks.suites.frozen import frozen_suite
 from benchmarks.training import card
@@ -81,3 +83,18 @@ def test_what_ships_is_small():
         p.stat().st_size for path in shipped_policies() for p in path.parent.glob(f"{path.stem}.*")
     )
     assert 0 < total < 1_000_000
+
+
+def test_every_seed_has_its_folder_and_ships_alone(tmp_path, monkeypatch):
+    pytest.importorskip("sb3_contrib")
+    from benchmarks.training import train_policies
+
+    asked = []
+    monkeypatch.setattr(train_policies, "run_train", lambda *words: asked.append(words))
+    words = ["train", "--algo", "ppo", "--task", "rotation", "--seeds", "3", "--seed", "5"]
+    done = CliRunner().invoke(app, [*words, "--out", str(tmp_path)])
+    assert done.exit_code == 0, done.stderr
+    assert [order.seed for order, *_ in asked] == [5, 6, 7]
+    assert [folder.name for _, folder, *_ in asked] == ["seed-5", "seed-6", "seed-7"]
+    done = CliRunner().invoke(app, [*words, "--out", str(tmp_path), "--ship"])
+    assert done.exit_code == 2 and "--ship takes one seed, got --seeds 3" in done.stderr
