@@ -125,7 +125,9 @@ def left_by(problem: FitProblem, fit: Fitted, extra: Sequence[CandidateEffect] =
     return float("inf") if pieces is None else float(np.sqrt(pieces.total()[0, 0]))
 
 
-def noiseless(dataset: Dataset, truth: Mapping[str, Any], given: Model) -> tuple[FitProblem, Model]:
+def noiseless(
+    dataset: Dataset, truth: Mapping[str, Any], initial_model: Model
+) -> tuple[FitProblem, Model]:
     """Trials without noise, and the lab's model at the true rig's parameters.
 
     What the effect changes comes from the generator, and is added to what our own plant gives
@@ -140,11 +142,11 @@ def noiseless(dataset: Dataset, truth: Mapping[str, Any], given: Model) -> tuple
     hidden = {effect["name"]: effect["parameters"] for effect in truth["effects"]}
     base, with_it = simulate_variants(commands, [(truth["base"], {}), (truth["base"], hidden)])
     noise = true_noise(truth)
-    plain = FitProblem([_read(t, r) for t, r in zip(trials, base, strict=True)], given,
-                  free_parameters(given), noise)  # fmt: skip
-    fit = plain.careful_fit(given)
+    plain = FitProblem([_read(t, r) for t, r in zip(trials, base, strict=True)], initial_model,
+                  free_parameters(initial_model), noise)  # fmt: skip
+    fit = plain.careful_fit(initial_model)
     if fit is None:
-        raise ValueError(f"model {given.name} cannot be simulated on {dataset.title}")
+        raise ValueError(f"model {initial_model.name} cannot be simulated on {dataset.title}")
     readings = plain.whitened_residuals(fit.model).readings(fit.values)
     assert readings is not None
     changed = [
