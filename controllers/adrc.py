@@ -95,7 +95,7 @@ class ADRC(ObserverFeedback[Settings]):
     name = "adrc"
 
     def _design(self, motion: NominalMotion) -> None:
-        settings = self._given or designed(self.name, motion.station, DEFAULTS)
+        settings = self._fixed_settings or designed(self.name, motion.station, DEFAULTS)
         self._motion, self._share = motion, settings.feedforward
         self._bandwidth = settings.controller_bandwidth
         self._offset = nominal_offset(motion.station)

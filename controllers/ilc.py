@@ -197,7 +197,7 @@ class ILC:
     repetitions = 10
 
     def __init__(self, settings: Settings | None = None) -> None:
-        self._given = settings
+        self._fixed_settings = settings
         self._learning_trials = LearningTrials(self.repetitions)
 
     def reset(self, reference: Reference, station: StationInfo) -> None:
@@ -207,7 +207,7 @@ class ILC:
             self._learn()
         else:
             self._motion = motion
-            self.settings = self._given or designed(self.name, station, DEFAULTS)
+            self.settings = self._fixed_settings or designed(self.name, station, DEFAULTS)
             self.learned = np.zeros(len(motion.volts))
             self._gain = LearningGain(self.settings.mismatch)
         self._position, self._late = station.position, station.observation_delay

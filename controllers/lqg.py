@@ -109,7 +109,7 @@ class LQG:
     name = "lqg"
 
     def __init__(self, settings: Settings | None = None) -> None:
-        self._given = settings
+        self._fixed_settings = settings
 
     def reset(self, reference: Reference, station: StationInfo) -> None:
         """Take the nominal motion and its gains, and estimate anew."""
@@ -130,7 +130,7 @@ class LQG:
             self._free_gains = regulator(a, free[1], weight, settings.effort)
 
     def _settings(self, station: StationInfo) -> Settings:
-        return self._given or designed(self.name, station, DEFAULTS)
+        return self._fixed_settings or designed(self.name, station, DEFAULTS)
 
     def act(self, measurement: Measurement, time: float) -> float:
         """Voltage (V) to send now."""

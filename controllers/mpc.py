@@ -103,7 +103,7 @@ class PreviewMPC:
     name = "mpc"
 
     def __init__(self, settings: Settings | None = None) -> None:
-        self._given = settings
+        self._fixed_settings = settings
 
     def reset(self, reference: Reference, station: StationInfo) -> None:
         """Foresee the trial: the nominal motion, the filters' gains, how voltages act.
@@ -111,7 +111,7 @@ class PreviewMPC:
         Raises:
             ImportError: osqp is not installed; says how to install it.
         """
-        self.settings = self._given or designed(self.name, station, DEFAULTS)
+        self.settings = self._fixed_settings or designed(self.name, station, DEFAULTS)
         trial = _Trial(reference, station, self.settings)
         self._design = _designed(trial)
         self._period, self._count = station.period, trial.horizon

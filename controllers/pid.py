@@ -51,7 +51,7 @@ class PID:
     name = "pid"
 
     def __init__(self, gains: Gains | None = None) -> None:
-        self._given = gains
+        self._fixed_gains = gains
         self.gains = gains or Gains(0.0, 0.0, 0.0, 0.0)
         self._reference: Reference = lambda time: 0.0
 
@@ -64,7 +64,7 @@ class PID:
         self._reference = reference
         self._position, self._period = station.position, station.period
         self._span = station.task.schedule.span
-        self.gains = self._given or scheduled_gains(self.name, station)
+        self.gains = self._fixed_gains or scheduled_gains(self.name, station)
         self._ahead = self.gains.lead - station.observation_delay
         self._offset = nominal_offset(station)
         self._integral = self._derivative = 0.0
@@ -95,7 +95,7 @@ class PID:
         """The feedback near a position (m or rad), without limits: volts by error."""
         import control
 
-        gains = self._given or scheduled_gains(self.name, station)
+        gains = self._fixed_gains or scheduled_gains(self.name, station)
         law = linear_law(gains.scaled(position / station.task.schedule.span), station.period)
         return control.StateSpace(*law, station.period)
 

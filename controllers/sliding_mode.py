@@ -115,7 +115,7 @@ class SlidingMode(ObserverFeedback[Settings]):
     name = "sliding_mode"
 
     def _design(self, motion: NominalMotion) -> None:
-        settings = self._given or designed(self.name, motion.station, DEFAULTS)
+        settings = self._fixed_settings or designed(self.name, motion.station, DEFAULTS)
         self._motion, self._most = motion, settings.switching
         self._observer = observer = ExtendedStateObserver(motion, settings.observer_bandwidth)
         poles = [observer.pole(place.lags, settings.layer_bandwidth) for place in observer.places]

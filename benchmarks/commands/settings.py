@@ -76,8 +76,8 @@ def remake(
 
     every = chain(jobs)
     names = [step.name for step in every]
-    for option, given in (("--only", listed(only)), ("--without", listed(without))):
-        for name in given:
+    for option, listed_names in (("--only", listed(only)), ("--without", listed(without))):
+        for name in listed_names:
             if name not in names:
                 refuse(ValueError(f"{option} takes {', '.join(names)}, got {name!r}"))
     chosen = [

@@ -224,8 +224,8 @@ def _cells(model: Model, devices: Sequence[Device]) -> list[tuple[str, ...]]:
     for device in devices:
         number, *sizes = device.muscles
         place = (f"{number}", *(f"{1e3 * size:.5g}" for size in (*sizes, device.radius)))
-        given = resistive_moment(model, device, pressure, FULL_ANGLE)
-        for p, moment, x, allowed in zip(pressure, *given, strict=True):
+        moments = resistive_moment(model, device, pressure, FULL_ANGLE)
+        for p, moment, x, allowed in zip(pressure, *moments, strict=True):
             figures = (f"{1e-3 * p:g}", f"{moment:.6g}", f"{1e3 * x:.6g}", f"{allowed:d}")
             rows.append((*place, *figures))
     return rows

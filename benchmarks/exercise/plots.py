@@ -46,11 +46,11 @@ def _draw_pressures(axis: Axes, model: Model, devices: Sequence[Device]) -> None
     diameters = sorted({device.muscles.diameter for device in devices})
     counts = sorted({device.muscles.number for device in devices})
     for device in devices:
-        given = resistive_moment(model, device, pressure, FULL_ANGLE)
+        moments = resistive_moment(model, device, pressure, FULL_ANGLE)
         number, diameter, _ = device.muscles
         color = _COLORS[diameters.index(diameter) % len(_COLORS)]
         line = _DASHES[counts.index(number) % len(_DASHES)]
-        moment = np.where(given.allowed, given.moment, np.nan)
+        moment = np.where(moments.allowed, moments.moment, np.nan)
         axis.plot(1e-3 * pressure, moment, color=color, linestyle=line)
         _label_end(axis, device, moment, color)
     checks = check_moments(model)
@@ -104,20 +104,20 @@ def _draw_answer(axis: Axes, model: Model, answer: Answer) -> None:
     degrees = answer.wanted.angle / _DEG
     label = f"smallest: {answer.device}".replace(" on a pulley", "\non a pulley")
     if answer.wanted.scheduled:
-        _draw_band(axis, model, answer.device, answer.given, "#D55E00", label)
+        _draw_band(axis, model, answer.device, answer.setting, "#D55E00", label)
         axis.plot(degrees, answer.wanted.moment, color="#D55E00", marker=".", label="prescription")
         return
     angle = _DEG * np.linspace(0.0, 90.0, 91)
-    moment = resistive_moment(model, answer.device, answer.given[0], angle).moment
+    moment = resistive_moment(model, answer.device, answer.setting[0], angle).moment
     axis.plot(angle / _DEG, moment, color="#D55E00", label=label)
     axis.plot(degrees, answer.wanted.moment, "o", color="#D55E00", label="prescription")
 
 
 def _draw_band(
-    axis: Axes, model: Model, device: Device, given: object, color: str, label: str
+    axis: Axes, model: Model, device: Device, setting: object, color: str, label: str
 ) -> None:
     """Between the moments of the lowest and the highest allowed pressure."""
-    rest = getattr(given, "rest_pressure", None) or lowest_rest_pressure(model, device)
+    rest = getattr(setting, "rest_pressure", None) or lowest_rest_pressure(model, device)
     if rest is None:
         return
     angle = _DEG * np.linspace(0.0, 90.0, 46)

@@ -126,7 +126,7 @@ class Answer(NamedTuple):
 
     wanted: Prescription
     device: Device
-    given: Held | Schedule
+    setting: Held | Schedule
 
     @property
     def words(self) -> str:
@@ -141,21 +141,21 @@ class Answer(NamedTuple):
             if self.device.muscles.extrapolated
             else "It is the tested muscle."
         )
-        return f"{_pressures(self.wanted, self.given)} {trust}"
+        return f"{_pressures(self.wanted, self.setting)} {trust}"
 
 
-def _pressures(wanted: Prescription, given: Held | Schedule) -> str:
-    if isinstance(given, Held):
+def _pressures(wanted: Prescription, setting: Held | Schedule) -> str:
+    if isinstance(setting, Held):
         return (
-            f"{wanted.moment[0]:g} N m at 90 deg is held at {1e-3 * given.pressure:.0f} kPa, the "
+            f"{wanted.moment[0]:g} N m at 90 deg is held at {1e-3 * setting.pressure:.0f} kPa, the "
             "cable set at that pressure."
         )
     degrees = wanted.angle / SI_FACTORS["deg"]
     shown = np.unique(np.linspace(0, len(degrees) - 1, 7).round().astype(int))
-    points = ", ".join(f"{degrees[i]:g} deg {1e-3 * given.pressure[i]:.0f}" for i in shown)
+    points = ", ".join(f"{degrees[i]:g} deg {1e-3 * setting.pressure[i]:.0f}" for i in shown)
     return (
-        f"The cable set at {1e-3 * given.rest_pressure:.0f} kPa, the pressure following the angle "
-        f"(kPa): {points}."
+        f"The cable set at {1e-3 * setting.rest_pressure:.0f} kPa, the pressure following the "
+        f"angle (kPa): {points}."
     )
 
 

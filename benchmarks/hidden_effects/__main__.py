@@ -43,8 +43,8 @@ def draw(
 ) -> None:
     """Draw cases: OUT/cases holds what a diagnosis may read, OUT/truth the rest."""
     chosen = [name for name in effects.split(",") if name]
-    for given, known in ((blocks.split(","), BLOCKS), (chosen, tuple(ALL))):
-        for name in given:
+    for names, known in ((blocks.split(","), BLOCKS), (chosen, tuple(ALL))):
+        for name in names:
             if name not in known:
                 raise typer.BadParameter(f"{name!r} is none of {', '.join(known)}")
     low, high = (float(end) for end in ratio.split(","))

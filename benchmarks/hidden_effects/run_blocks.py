@@ -154,8 +154,8 @@ def merged(documents: Sequence[dict[str, Any]]) -> dict[str, Any]:
     for document in documents:
         blocks |= document["blocks"]
     # A document that was merged before has a list of them.
-    given = [document["seed"] for document in documents]
-    seeds = sorted({s for each in given for s in (each if isinstance(each, list) else [each])})
+    listed = [document["seed"] for document in documents]
+    seeds = sorted({s for each in listed for s in (each if isinstance(each, list) else [each])})
     failures = [each for document in documents for each in document["failures"]]
     return {
         "schema": 1,

@@ -95,11 +95,11 @@ def run_measured(
 
 def _computed(stages: Stages, jobs: int, seed: int, most: int, tell: Tell) -> Measured:
     """Diagnoses and what judges them, one stage after the other; the time it took is left 0."""
-    given = load_model(GIVEN)
+    initial_model = load_model(GIVEN)
     few, more = (diagnosed(DIAGNOSED_KPA, *which) for which in zip(LOADS_N, REPEATS, strict=True))
     diagnoses, amended = rounds(
         (few, more),
-        given,
+        initial_model,
         stages,
         seed,
         jobs,
@@ -109,7 +109,7 @@ def _computed(stages: Stages, jobs: int, seed: int, most: int, tell: Tell) -> Me
     effects = [name for each in diagnoses for name in each.effects]
     judged = judged_at(DIAGNOSED_KPA), judged_at(UNSEEN_KPA)
     stepped = steps(
-        given,
+        initial_model,
         amended,
         effects,
         (diagnosed(DIAGNOSED_KPA), *judged),
@@ -118,12 +118,12 @@ def _computed(stages: Stages, jobs: int, seed: int, most: int, tell: Tell) -> Me
         partial(tell, "effect by effect"),
     )
     left_out = folds(
-        given, amended, effects, _without, FOLDS, jobs, partial(tell, "pressures left out")
+        initial_model, amended, effects, _without, FOLDS, jobs, partial(tell, "pressures left out")
     )
     final = load_model(stages.folder / f"step_{len(stepped) - 1}.toml")
     questions = partial(tell, "what is not detectable")
     not_detectable, proposals = undecidable(final, few, jobs, seed, questions)
-    models = {GIVEN: given, STATION: load_model(STATION), "amended": final}
+    models = {GIVEN: initial_model, STATION: load_model(STATION), "amended": final}
     return Measured(
         diagnoses,
         stepped,
@@ -132,7 +132,7 @@ def _computed(stages: Stages, jobs: int, seed: int, most: int, tell: Tell) -> Me
         smooth_errors(*judged),
         not_detectable,
         proposals,
-        held_against(models, given),
+        held_against(models, initial_model),
         0.0,
         _settings(seed, stages),
     )

@@ -48,30 +48,33 @@ class Rig:
 
     Attributes:
         data: the trials.
-        given: the model.
+        initial_model: the model.
         problem: trials and noise, ready for fits; its own parameters about the given model's.
         known: every effect that may be added, by name.
     """
 
     data: Dataset
-    given: Model
+    initial_model: Model
     problem: FitProblem
     known: dict[str, CandidateEffect]
 
     @classmethod
-    def of(cls, data: Dataset, given: Model, threads: int = 1) -> "Rig":
+    def of(cls, data: Dataset, initial_model: Model, threads: int = 1) -> "Rig":
         """From trials, with noise from their repeats."""
         trials = [each.trial for each in data.trials]
-        logged = [Logged.of(given, i, trial) for i, trial in enumerate(trials)]
-        levels = initial_floors(given, logged, data.trials)
+        logged = [Logged.of(initial_model, i, trial) for i, trial in enumerate(trials)]
+        levels = initial_floors(initial_model, logged, data.trials)
         noise = tuple(white_noise(each.level) for each in levels)
-        own = free_parameters(given)
+        own = free_parameters(initial_model)
         problem = FitProblem(
-            trials, given, FreeParameters(own.free, WIDER * own.prior), noise, threads
+            trials, initial_model, FreeParameters(own.free, WIDER * own.prior), noise, threads
         )
         orders = [float(each.order or 0.0) for each in data.trials]
         return cls(
-            data, given, problem, {each.name: each for each in candidate_effects(given, orders)}
+            data,
+            initial_model,
+            problem,
+            {each.name: each for each in candidate_effects(initial_model, orders)},
         )
 
     def fit(self, effects: Sequence[str], begun: Model) -> Fitted | None:
@@ -90,7 +93,7 @@ class Rig:
         }
         free = self.problem.own.free
         own = dict(zip(free, values(begun, free).tolist(), strict=True))
-        return self.problem.fit(self.given.replace(own), chosen, starts)
+        return self.problem.fit(self.initial_model.replace(own), chosen, starts)
 
 
 AT_LOAD = "extension_at_load_mm"

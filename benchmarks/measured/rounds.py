@@ -168,7 +168,7 @@ class Round:
 
 def rounds(
     data: Sequence[Dataset],
-    given: Model,
+    initial_model: Model,
     stages: Stages,
     seed: int,
     jobs: int,
@@ -179,7 +179,7 @@ def rounds(
 
     Args:
         data: sets of trials, the smallest first: what is large shows in few, and is found sooner.
-        given: the model to begin with.
+        initial_model: the model to begin with.
         stages: finished rounds and fits, from which an interrupted job goes on.
         seed: of simulated chance.
         jobs: threads.
@@ -189,7 +189,7 @@ def rounds(
         The rounds, the last of which added nothing unless there were too many; the amended model.
     """
     done: list[Round] = []
-    model = given
+    model = initial_model
     for some in data:
         while len(done) < most:
             number = len(done) + 1

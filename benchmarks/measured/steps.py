@@ -117,7 +117,7 @@ class Step:
 
 
 def steps(
-    given: Model,
+    initial_model: Model,
     amended: Model,
     effects: Sequence[str],
     data: tuple[Dataset, Dataset, Dataset],
@@ -128,7 +128,7 @@ def steps(
     """The model as given, refitted, and with one effect more at a time.
 
     Args:
-        given: the model to begin with.
+        initial_model: the model to begin with.
         amended: with all effects, where fits begin.
         effects: in the order in which a diagnosis added them.
         data: what models are fitted to; I3's trials at those pressures; those at other pressures.
@@ -137,7 +137,7 @@ def steps(
         progress: called with what is done and the total.
     """
     fitted, seen, unseen = data
-    rig = Rig.of(fitted, given, jobs)
+    rig = Rig.of(fitted, initial_model, jobs)
     names = [AS_GIVEN, REFITTED, *effects]
     trials = [each.trial for part in data for each in part.trials]
     done = []
@@ -147,7 +147,7 @@ def steps(
         asked, stage = digest(trials, amended, f"steps {name} {some}"), f"step_{number}"
         step = stages.kept(stage, asked, Step)
         if step is None:
-            model = given if name == AS_GIVEN else _fitted(rig, some, amended)
+            model = initial_model if name == AS_GIVEN else _fitted(rig, some, amended)
             step = _judged(name, some, model, seen, unseen, stages.folder / f"{stage}.toml")
             stages.keep(stage, asked, asdict(step))
         done.append(step)
@@ -156,7 +156,7 @@ def steps(
 
 
 def folds(
-    given: Model,
+    initial_model: Model,
     amended: Model,
     effects: Sequence[str],
     data_of: Callable[[Sequence[float]], tuple[Dataset, Dataset]],
@@ -167,7 +167,7 @@ def folds(
     """Rms errors with each group of pressures (kPa) left out once, all other pressures seen.
 
     Args:
-        given: the model to begin with.
+        initial_model: the model to begin with.
         amended: with all effects, where fits begin.
         effects: what is added to the given model.
         data_of: what is fitted to, and what is judged on, with pressures left out.
@@ -180,7 +180,7 @@ def folds(
     for number, group in enumerate(groups):
         progress(number, len(groups))
         fitted, judged = data_of(group)
-        model = _fitted(Rig.of(fitted, given, jobs), effects, amended)
+        model = _fitted(Rig.of(fitted, initial_model, jobs), effects, amended)
         for name, errors in limit_errors(model, judged).items():
             squares[name] += float(errors @ errors)
             counts[name] += len(errors)
@@ -190,11 +190,13 @@ def folds(
 
 def _fitted(rig: Rig, effects: Sequence[str], begun: Model) -> Model:
     """The better of fits that begin at an amended model and at the given one."""
-    fits = [fit for model in (begun, rig.given) if (fit := rig.fit(effects, model)) is not None]
+    fits = [
+        fit for model in (begun, rig.initial_model) if (fit := rig.fit(effects, model)) is not None
+    ]
     if not fits:
         raise ValueError(
-            f"{rig.given.name} with {', '.join(effects) or 'no effect'} cannot be simulated on "
-            "tables I2 and I3"
+            f"{rig.initial_model.name} with {', '.join(effects) or 'no effect'} cannot be "
+            "simulated on tables I2 and I3"
         )
     return min(fits, key=lambda fit: fit.chi_square).model
 

@@ -252,9 +252,9 @@ def _drive(environment: PMAEnv, controller: Controller, log: _Log) -> None:
         answered = clock()
         volts = checked_volts(answer, now)
         action = environment.action(volts)
-        given = clock()
+        step_start = clock()
         _, _, terminated, truncated, _ = environment.step(action)
-        log.step_seconds += clock() - given
+        log.step_seconds += clock() - step_start
         log.asked.append(volts)
         log.act_seconds.append(answered - asked)
         log.commands.append((environment.motor_voltage, environment.regulator_voltage))

@@ -167,7 +167,7 @@ def parse_suite(source: str, document: Mapping[str, Any]) -> FrozenSuite:
         "recipe": _recipe(stations, document["model"]),
         "episode_plans": episode_plans,
         "entries": tuple(_entry(entry) for entry in document["controllers"]),
-        "targets": tuple(parse_target(given) for given in document.get("targets", ())),
+        "targets": tuple(parse_target(table) for table in document.get("targets", ())),
         "digest": _digest(document),
         "only_by_name": document.get("only_by_name", False),
     }
@@ -188,22 +188,22 @@ def load_suite(name: str = "reproduction") -> ReproductionSuite:
     return suite
 
 
-def _reproduction(given: Mapping[str, Any], common: Mapping[str, Any]) -> ReproductionSuite:
+def _reproduction(table: Mapping[str, Any], common: Mapping[str, Any]) -> ReproductionSuite:
     """A suite on several models, with the report of the reproduction.
 
     Args:
-        given: the file's `[reproduction]`.
+        table: the file's `[reproduction]`.
         common: what any suite has.
     """
-    goals = given["goals"] | {"feedback": tuple(given["goals"]["feedback"])}
+    goals = table["goals"] | {"feedback": tuple(table["goals"]["feedback"])}
     suite = ReproductionSuite(
         **common,
         frozen_digest=common["digest"],
         models=(common["model"],),
-        pictured_kpa={task: tuple(kpa) for task, kpa in given["pictured_kpa"].items()},
+        pictured_kpa={task: tuple(kpa) for task, kpa in table["pictured_kpa"].items()},
         goals=Goals(**goals),
     )
-    return suite.on(given["models"])
+    return suite.on(table["models"])
 
 
 def _recipe(stations: Mapping[str, Any], model: str) -> Recipe | None:
@@ -219,21 +219,21 @@ def _recipe(stations: Mapping[str, Any], model: str) -> Recipe | None:
     return other.recipe
 
 
-def _episode_plan(given: Mapping[str, Any]) -> EpisodePlan:
-    unknown = [task for task in given["tasks"] if named_task(task) is None]
+def _episode_plan(table: Mapping[str, Any]) -> EpisodePlan:
+    unknown = [task for task in table["tasks"] if named_task(task) is None]
     if unknown:
         raise ValueError(f"unknown tasks: {', '.join(unknown)}; known: {', '.join(EVERY_TASK)}")
     return EpisodePlan(
-        tasks=tuple(given["tasks"]),
-        pressures_kpa=tuple(given["pressures_kpa"]),
-        per_station=given.get("per_station", 0),
-        repeats=given.get("repeats", 1),
+        tasks=tuple(table["tasks"]),
+        pressures_kpa=tuple(table["pressures_kpa"]),
+        per_station=table.get("per_station", 0),
+        repeats=table.get("repeats", 1),
     )
 
 
-def _entry(given: Mapping[str, Any]) -> Entry:
-    spec = ControllerSpec(given["name"], given["title"])
-    return Entry(spec, tuple(given.get("only", ())), tuple(given.get("models", ())))
+def _entry(table: Mapping[str, Any]) -> Entry:
+    spec = ControllerSpec(table["name"], table["title"])
+    return Entry(spec, tuple(table.get("only", ())), tuple(table.get("models", ())))
 
 
 def _digest(document: Mapping[str, Any]) -> str:

@@ -55,11 +55,11 @@ class Recipe:
     effects: tuple[Occasional, ...]
 
 
-def parse_recipe(given: Mapping[str, Any], model: str) -> Recipe:
+def parse_recipe(table: Mapping[str, Any], model: str) -> Recipe:
     """A recipe from a suite's file.
 
     Args:
-        given: its table `[stations]`.
+        table: its table `[stations]`.
         model: name of the nominal model.
     Raises:
         RecipeError: a model or an effect that cannot be drawn so.
@@ -68,22 +68,22 @@ def parse_recipe(given: Mapping[str, Any], model: str) -> Recipe:
         raise RecipeError(f"stations are drawn about the model of a station, {model} is none")
     return Recipe(
         model=model,
-        seed=given["seed"],
-        training_seed=given["training_seed"],
-        widening=given["widening"],
-        variation=given["variation"],
-        reach_v=given["reach_v"],
-        trials={task: tuple(pressures) for task, pressures in given["trials"].items()},
-        effects=tuple(_occasional(entry) for entry in given.get("effects", ())),
+        seed=table["seed"],
+        training_seed=table["training_seed"],
+        widening=table["widening"],
+        variation=table["variation"],
+        reach_v=table["reach_v"],
+        trials={task: tuple(pressures) for task, pressures in table["trials"].items()},
+        effects=tuple(_occasional(entry) for entry in table.get("effects", ())),
     )
 
 
-def _occasional(given: Mapping[str, Any]) -> Occasional:
-    name, share = given["name"], given["share"]
+def _occasional(table: Mapping[str, Any]) -> Occasional:
+    name, share = table["name"], table["share"]
     if name not in CATALOGUE or CATALOGUE[name].neutral is None:
         raise RecipeError(f"no effect {name!r} that a station may have or not; see the catalogue")
-    ranges = {file_key: tuple(ends) for file_key, ends in given["ranges"].items()}
-    tied = {file_key: (tie["to"], tie["factor"]) for file_key, tie in given.get("tied", {}).items()}
+    ranges = {file_key: tuple(ends) for file_key, ends in table["ranges"].items()}
+    tied = {file_key: (tie["to"], tie["factor"]) for file_key, tie in table.get("tied", {}).items()}
     wanted, given_here = CATALOGUE[name].names_in_files(), [*ranges, *tied]
     # What has a default in model files has it here: it is not drawn.
     needed = [d for d in wanted if d in given_here or d not in CATALOGUE[name].defaults]

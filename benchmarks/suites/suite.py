@@ -46,16 +46,16 @@ class Target(NamedTuple):
     controllers: tuple[str, ...] = ()
 
 
-def parse_target(given: Mapping[str, Any]) -> Target:
+def parse_target(table: Mapping[str, Any]) -> Target:
     """A target from a suite's file, its table `[[targets]]`.
 
     Raises:
         ValueError: an unknown figure or key, or controllers where none or some are needed.
     """
-    unknown = set(given) - set(Target._fields)
+    unknown = set(table) - set(Target._fields)
     if unknown:
         raise ValueError(f"targets: unknown {', '.join(sorted(unknown))}; known: {Target._fields}")
-    figure, controllers = given["figure"], tuple(given.get("controllers", ()))
+    figure, controllers = table["figure"], tuple(table.get("controllers", ()))
     if figure not in FIGURES:
         raise ValueError(f"targets: figure must be one of {', '.join(FIGURES)}, got {figure!r}")
     if bool(controllers) != (figure in PER_CONTROLLER):
@@ -63,8 +63,8 @@ def parse_target(given: Mapping[str, Any]) -> Target:
         raise ValueError(f"targets: {figure} {rule} controllers, got {list(controllers)}")
     if figure == "to_other" and len(controllers) != 2:
         raise ValueError(f"targets: to_other compares two controllers, got {list(controllers)}")
-    most = given.get("most")
-    return Target(figure, given["measure"], None if most is None else float(most), controllers)
+    most = table.get("most")
+    return Target(figure, table["measure"], None if most is None else float(most), controllers)
 
 
 SUITES = Path(__file__).parent

@@ -87,8 +87,8 @@ class KeptRows:
     def __init__(self, out: Path, made_with: dict[str, Any]) -> None:
         self.path = out.with_name(f"{out.stem}.partial.json")
         # As JSON gives it back, so that the two can be compared.
-        given = made_with | {"commit": git_state(ROOT)["commit"]}
-        self.made_with = json.loads(json.dumps(given))
+        provenance = made_with | {"commit": git_state(ROOT)["commit"]}
+        self.made_with = json.loads(json.dumps(provenance))
         self.rows = self._read()
 
     def keep(self, row: Job, result: tuple[Gains, float]) -> None:

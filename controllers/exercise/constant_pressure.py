@@ -62,6 +62,6 @@ def nearest_pressure(station: StationInfo, exercise: "Exercise") -> float:
     wanted = np.array([exercise.prescription.at(angle) for angle in ANGLES.tolist()])
     moments = Resistance(station).moments
     fine = np.arange(PRESSURES[0], PRESSURES[-1], 1e3)
-    given = np.array([np.interp(fine, PRESSURES, column) for column in moments.T])
-    missed = np.mean((given - wanted[:, None]) ** 2, axis=0)
+    available = np.array([np.interp(fine, PRESSURES, column) for column in moments.T])
+    missed = np.mean((available - wanted[:, None]) ** 2, axis=0)
     return float(fine[np.argmin(missed)])

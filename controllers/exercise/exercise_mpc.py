@@ -110,7 +110,7 @@ class ExerciseMPC:
     kinds = ("isokinetic", "moment")
 
     def __init__(self, settings: Settings | None = None) -> None:
-        self._given = settings
+        self._fixed_settings = settings
 
     def reset(self, reference: Reference, station: StationInfo) -> None:
         """Begin at rest, at the trial's first pressure.
@@ -120,7 +120,7 @@ class ExerciseMPC:
             ValueError: the task is no exercise.
         """
         self._prescription = exercise_of(self.name, station).prescription
-        self.settings = self._given or (ANGLE if self._prescription is None else MOMENT)
+        self.settings = self._fixed_settings or (ANGLE if self._prescription is None else MOMENT)
         self._station, self._device, self._volts = station, Resistance(station), volts_of(station)
         self._leg = LegObserver(station, self.settings.process_noise)
         self._regulator = PressureObserver(station, self.settings.process_noise)

@@ -306,7 +306,7 @@ class ObserverFeedback(ABC, Generic[Settings]):
     _observer: ExtendedStateObserver
 
     def __init__(self, settings: Settings | None = None) -> None:
-        self._given = settings
+        self._fixed_settings = settings
 
     @abstractmethod
     def _design(self, motion: NominalMotion) -> None:
@@ -338,7 +338,7 @@ class ObserverFeedback(ABC, Generic[Settings]):
 
     def linear(self, station: StationInfo, position: float) -> "control.StateSpace":
         """The feedback near a position (m or rad) where it is linear: volts by error."""
-        made = type(self)(self._given)
+        made = type(self)(self._fixed_settings)
         made._design(nominal_motion(station.task.schedule.at, station))
         at = made._observer.nearest(position)
         return made._observer.linear(at, made._gains(at))

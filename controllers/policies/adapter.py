@@ -75,16 +75,16 @@ class ActionMapping:
             )
 
     @classmethod
-    def of(cls, given: Mapping[str, Any]) -> "ActionMapping":
+    def of(cls, document: Mapping[str, Any]) -> "ActionMapping":
         """An action mapping from JSON.
 
         Raises:
             ValueError: a key that is unknown or missing, or a value out of range.
         """
-        strange = sorted(set(given) ^ {"kind", "authority_v", "base"})
+        strange = sorted(set(document) ^ {"kind", "authority_v", "base"})
         if strange:
             raise ValueError(f"a form has kind, authority_v and base; check {', '.join(strange)}")
-        return cls(**given)
+        return cls(**document)
 
     def to_json(self) -> dict[str, Any]:
         """The mapping as JSON."""

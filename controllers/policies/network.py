@@ -167,12 +167,12 @@ def check_chain(weights: Weights) -> None:
     """
     if not weights.layers:
         raise ValueError("a network must have at least one layer, got none")
-    for what, given, known in (
+    for what, name, known in (
         ("activation", weights.activation, ACTIVATIONS),
         ("output", weights.output, OUTPUTS),
     ):
-        if given not in known:
-            raise ValueError(f"{what} must be one of {', '.join(known)}, got {given!r}")
+        if name not in known:
+            raise ValueError(f"{what} must be one of {', '.join(known)}, got {name!r}")
     before: int | None = None
     for i, (weight, bias) in enumerate(weights.layers):
         if weight.ndim != 2 or bias.shape != weight.shape[:1]:

@@ -195,16 +195,16 @@ class ObservationSpec:
                 )
 
     @classmethod
-    def of(cls, given: Mapping[str, Any]) -> "ObservationSpec":
+    def of(cls, document: Mapping[str, Any]) -> "ObservationSpec":
         """An observation specification from JSON.
 
         Raises:
             ValueError: a key that is unknown or missing, or a value out of range.
         """
-        strange = sorted(set(given) ^ {"kind", "preview", "history"})
+        strange = sorted(set(document) ^ {"kind", "preview", "history"})
         if strange:
             raise ValueError(f"a view has kind, preview and history; check {', '.join(strange)}")
-        return cls(**given)
+        return cls(**document)
 
     def to_json(self) -> dict[str, Any]:
         """The specification as JSON."""

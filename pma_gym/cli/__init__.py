@@ -89,9 +89,9 @@ def simulate(
     if out.exists() and commands.exists() and out.samefile(commands):
         raise TrialError(f"--out {out} is the command file itself; name another file")
     plant = Plant(load_model(model))
-    given = read(commands)
+    command_trial = read(commands)
     try:
-        trial = plant.simulate(given, noise, seed, interpolation=interpolation.value)
+        trial = plant.simulate(command_trial, noise, seed, interpolation=interpolation.value)
     except SampleError as error:
         raise TrialError(error.at(place_in_file(commands, error.sample))) from error
     except ValueError as error:

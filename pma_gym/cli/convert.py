@@ -36,10 +36,10 @@ def convert(
     path = folder / DESCRIPTION
     if path.exists() and not force:
         raise OutputError(f"{path} is there already; --force replaces it, or rename it")
-    given = load_model(model)
+    initial_model = load_model(model)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        columns, count = seen_columns(folder, Description(), quantities(given))
+        columns, count = seen_columns(folder, Description(), quantities(initial_model))
     if not as_json:
         console().print(_table(columns, count))
     title = folder.resolve().name
@@ -47,7 +47,7 @@ def convert(
     older = path.read_bytes() if path.exists() else None
     replace_file(path, draft(title, _named(model, folder), columns, ()).encode())
     try:
-        said = _checked(folder, given)
+        said = _checked(folder, initial_model)
         replace_file(path, draft(title, _named(model, folder), columns, said).encode())
     except BaseException:
         if older is not None:

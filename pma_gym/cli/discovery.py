@@ -192,7 +192,7 @@ def diagnose(
     )
     _check_apart(results, dataset)
     results.check(force, resume)
-    trials, given = _inputs(dataset, model, checks)
+    trials, initial_model = _inputs(dataset, model, checks)
     from pma_gym import discovery
     from pma_gym.discovery.experiments.command_file import proposed_file
     from pma_gym.discovery.fitting.trial_states import dump_states
@@ -200,7 +200,9 @@ def diagnose(
 
     with results.opened(resume):
         arguments = {"seed": seed, "jobs": jobs, "journal": results.journal}
-        diagnosis = _run(discovery.diagnose, trials, given, results, arguments, TimeLeft(DIAGNOSIS))
+        diagnosis = _run(
+            discovery.diagnose, trials, initial_model, results, arguments, TimeLeft(DIAGNOSIS)
+        )
         files = {
             "diagnosis.json": diagnosis.text().encode(),
             "model.toml": dump_model(diagnosis.model).encode(),
@@ -210,7 +212,9 @@ def diagnose(
             ).encode(),
         }
         if diagnosis.next_experiment:
-            files["next.csv"] = proposed_file(diagnosis.next_experiment.trial, trials, given)
+            files["next.csv"] = proposed_file(
+                diagnosis.next_experiment.trial, trials, initial_model
+            )
         results.write(files)
     from pma_gym.discovery.report.summary import diagnosis_summary
 
@@ -235,13 +239,13 @@ def fit(
     results = Results(out or _default(dataset, "fit"), ("model.toml", "trials.toml", "fit.json"))
     _check_apart(results, dataset)
     results.check(force)
-    trials, given = _inputs(dataset, model, checks)
+    trials, initial_model = _inputs(dataset, model, checks)
     from pma_gym import discovery
     from pma_gym.discovery.fitting.trial_states import dump_states
 
     with results.opened():
         arguments = {"seed": seed, "jobs": jobs}
-        refitted = _run(discovery.refit, trials, given, results, arguments, TimeLeft(FIT))
+        refitted = _run(discovery.refit, trials, initial_model, results, arguments, TimeLeft(FIT))
         document = refitted.document()
         kept = {key: document[key] for key in _FITTED}
         results.write(
@@ -278,14 +282,14 @@ def _inputs(folder: Path, model: str | None, checks: bool) -> tuple[Dataset, Mod
     """The data set and the model, all that can be refused before anything is fitted."""
     with warnings_said():
         trials = read_dataset(folder)
-    given = load_model(model or trials.model or DEFAULT_MODEL)
-    if given.rig.is_diagnosable:
+    initial_model = load_model(model or trials.model or DEFAULT_MODEL)
+    if initial_model.rig.is_diagnosable:
         from pma_gym.discovery.preparation.data_checks import check_dataset
 
-        trials = check_dataset(trials, given, stop=checks)
+        trials = check_dataset(trials, initial_model, stop=checks)
         for words in trials.checked or ():
             say(f"warning: {words}")
-    return trials, given
+    return trials, initial_model
 
 
 def _run(

@@ -56,13 +56,13 @@ def _with_effects(function: Callable[..., Any]) -> Callable[..., Any]:
         return function
 
     @wraps(function)
-    def run(*given: Any, effect: list[Path] | None, **named: Any) -> Any:  # noqa: ANN401
+    def run(*arguments: Any, effect: list[Path] | None, **named: Any) -> Any:  # noqa: ANN401
         for path in effect or ():
             # Imported here: who completes a word or asks for help waits for no catalogue.
             from pma_gym.effects.user_effects import load_effects
 
             load_effects(path)
-        return function(*given, **named)
+        return function(*arguments, **named)
 
     signature = inspect.signature(function)
     added = inspect.Parameter(
@@ -75,8 +75,8 @@ def _with_effects(function: Callable[..., Any]) -> Callable[..., Any]:
 
 
 class _StrictCommand(TyperCommand):
-    def __init__(self, *given: Any, **options: Any) -> None:
-        super().__init__(*given, **options)
+    def __init__(self, *arguments: Any, **options: Any) -> None:
+        super().__init__(*arguments, **options)
         _make_strict(self)
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:  # noqa: ANN401
@@ -85,8 +85,8 @@ class _StrictCommand(TyperCommand):
 
 
 class _StrictGroup(TyperGroup):
-    def __init__(self, *given: Any, **options: Any) -> None:
-        super().__init__(*given, **options)
+    def __init__(self, *arguments: Any, **options: Any) -> None:
+        super().__init__(*arguments, **options)
         _make_strict(self)
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:  # noqa: ANN401
@@ -106,9 +106,9 @@ def _nearest_option(command: Any) -> Iterator[None]:  # noqa: ANN401
         visible = [param for param in command.params if not getattr(param, "hidden", False)]
         known = [name for param in visible for name in (*param.opts, *param.secondary_opts)]
         options = [name for name in (*known, "--help") if name.startswith("-")]
-        given = error.option_name  # type: ignore[attr-defined]
-        near = get_close_matches(given, options, 1)
-        error.message = f"No such option: {printable(given[:60])}"  # type: ignore[attr-defined]
+        option = error.option_name  # type: ignore[attr-defined]
+        near = get_close_matches(option, options, 1)
+        error.message = f"No such option: {printable(option[:60])}"  # type: ignore[attr-defined]
         error.message += f". Did you mean {near[0]}?" if near else ""  # type: ignore[attr-defined]
         error.possibilities = None  # type: ignore[attr-defined]
         raise

@@ -170,16 +170,18 @@ class Value:
             "a traced value is no number yet: use NumPy's functions, such as np.tanh(x), not math's"
         )
 
-    def __array_ufunc__(self, function: Any, method: str, *given: Any, **options: Any) -> Any:  # noqa: ANN401
-        return self.__array_function__(function, (), given, options | dict(method=method))
+    def __array_ufunc__(self, function: Any, method: str, *arguments: Any, **options: Any) -> Any:  # noqa: ANN401
+        return self.__array_function__(function, (), arguments, options | dict(method=method))
 
-    def __array_function__(self, function: Any, _types: Any, given: Any, options: Any) -> Any:  # noqa: ANN401
+    def __array_function__(self, function: Any, _types: Any, arguments: Any, options: Any) -> Any:  # noqa: ANN401
         name = function.__name__
         if options.pop("method", "__call__") != "__call__" or options or name not in NUMPY:
             raise TypeError(f"laws have no np.{name} like this; of np they have {', '.join(NUMPY)}")
-        if any(isinstance(each, np.ndarray) for each in given):
+        if any(isinstance(each, np.ndarray) for each in arguments):
             return NotImplemented
-        return NUMPY[name](*(one.item() if isinstance(one, np.generic) else one for one in given))
+        return NUMPY[name](
+            *(one.item() if isinstance(one, np.generic) else one for one in arguments)
+        )
 
 
 class ValueGraph(ABC):
@@ -199,7 +201,7 @@ class ValueGraph(ABC):
         """A number, as a value."""
 
     @abstractmethod
-    def value(self, given: Value | Number, kind: Kind = "real") -> Value:
+    def value(self, operand: Value | Number, kind: Kind = "real") -> Value:
         """The value itself, or the number as a constant of this kind."""
 
     @abstractmethod

@@ -107,17 +107,17 @@ class Graph(ValueGraph):
             self._known["constant", kind, key] = value
         return value
 
-    def value(self, given: "Value | Number", kind: Kind = "real") -> Value:
+    def value(self, operand: "Value | Number", kind: Kind = "real") -> Value:
         """Return a value unchanged, or a number as a constant of this kind.
 
         Raises:
             ValueError: a value of another graph.
         """
-        if not isinstance(given, Value):
-            return self.constant(given, kind)
-        if given.graph is not self:
+        if not isinstance(operand, Value):
+            return self.constant(operand, kind)
+        if operand.graph is not self:
             raise ValueError("values of two graphs in one expression")
-        return given
+        return operand
 
     def apply(self, operation: str, *operands: Value) -> Value:
         """Make the simplified value of an operation; the operators of `Value` call this.

@@ -121,12 +121,12 @@ _NUMPY: dict[str, Callable] = {
 _TYPES = {"real": np.float64, "integer": np.uint64, "truth": np.bool_}
 
 
-def evaluate(outputs: Sequence[Value], given: Mapping[str, Any]) -> list[np.ndarray]:
+def evaluate(outputs: Sequence[Value], inputs: Mapping[str, Any]) -> list[np.ndarray]:
     """The outputs for numbers or NumPy arrays of one shape.
 
     Args:
         outputs: results of the calculation.
-        given: a number or an array for every input that they depend on, by name.
+        inputs: a number or an array for every input that they depend on, by name.
     """
     numbers: dict[int, Any] = {}
     with np.errstate(all="ignore"):
@@ -135,6 +135,6 @@ def evaluate(outputs: Sequence[Value], given: Mapping[str, Any]) -> list[np.ndar
                 parts = [numbers[part.id] for part in value.operands]
                 numbers[value.id] = np.asarray(_NUMPY[value.operation](*parts))
             else:
-                number = value.data if value.is_constant else given[value.data]
+                number = value.data if value.is_constant else inputs[value.data]
                 numbers[value.id] = np.asarray(number, _TYPES[value.kind])
     return [numbers[value.id] for value in outputs]

@@ -148,16 +148,16 @@ def _sort(value: Value) -> str:
     return _COUNTED.get(value.operation, "choose")
 
 
-def substitute(outputs: Sequence[Value], given: Mapping[int, Value]) -> list[Value]:
+def substitute(outputs: Sequence[Value], replacements: Mapping[int, Value]) -> list[Value]:
     """Return the outputs with some values replaced by others.
 
     Args:
         outputs: traced values.
-        given: new values by the `Value.id` of those that they replace.
+        replacements: new values by the `Value.id` of those that they replace.
     Returns:
         The outputs, made of the new values; what depends on none of them stays the same value.
     """
-    replaced = dict(given)
+    replaced = dict(replacements)
     for value in order(outputs):
         if value.id in replaced:
             continue

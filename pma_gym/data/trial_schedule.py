@@ -133,12 +133,14 @@ class TrialSchedule:
 
     def __setstate__(self, state: Mapping[str, Any]) -> None:
         """Take what `__getstate__` gave."""
-        given = dict(state)
-        motion = given.pop("motion", None)
+        attributes = dict(state)
+        motion = attributes.pop("motion", None)
         if isinstance(motion, Packed):
             function: Any = motion.value()
-            given["phases"] = tuple(replace(phase, motion=function) for phase in given["phases"])
-        self.__dict__.update(given)
+            attributes["phases"] = tuple(
+                replace(phase, motion=function) for phase in attributes["phases"]
+            )
+        self.__dict__.update(attributes)
 
     def __deepcopy__(self, memo: dict[int, Any]) -> Self:
         """A copy with phases of its own: whoever overwrites those by force changes no other trial.

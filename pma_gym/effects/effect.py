@@ -114,8 +114,8 @@ class Effect:
 
     @property
     def _usual(self) -> dict[str, float]:
-        given = self.quantities.items()
-        return {name: q.to_si(q.usual) for name, q in given if q.usual is not None}
+        quantities = self.quantities.items()
+        return {name: q.to_si(q.usual) for name, q in quantities if q.usual is not None}
 
     @property
     def start(self) -> Parameters:
@@ -174,11 +174,11 @@ class Effect:
                     for file_key, usual in self.defaults.items()
                 )
             )
-        given = {
+        si_values = {
             names[file_key]: self._si(file_key, names[file_key], values[file_key])
             for file_key in values
         }
-        return self.checked(self.parameters(**given))
+        return self.checked(self.parameters(**si_values))
 
     def changed(self, parameters: Parameters, values: Mapping[str, Value]) -> Parameters:
         """Replace some parameters by values keyed by their names in files.
@@ -187,11 +187,11 @@ class Effect:
             ValueError: an unknown or out-of-bounds parameter.
         """
         names = self.names_in_files()
-        given = {
+        si_values = {
             names[file_key]: self._si(file_key, names[file_key], values[file_key])
             for file_key in values
         }
-        return self.checked(parameters._replace(**given))
+        return self.checked(parameters._replace(**si_values))
 
     def checked(self, parameters: Parameters) -> Parameters:
         """Return the parameters after a check of their rows.

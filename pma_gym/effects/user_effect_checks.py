@@ -142,16 +142,16 @@ def _absence(effect: Effect, _module: ModuleType) -> str:
         known |= {"p": effect.neutral, "memory": _memories(effect, lambda _: 0.0)}
         try:
             with np.errstate(all="ignore"):
-                given = law(*(known[name] for name in signals(law)))
+                result = law(*(known[name] for name in signals(law)))
         except ZeroDivisionError:
             return f"divides by 0 at its neutral values, in {law.__name__}; change the formula"
         expected = known[absent] if isinstance(absent, str) else absent
-        if given != expected:
+        if result != expected:
             at = ", ".join(f"{n} {known[n]:g}" for n in signals(law) if n not in ("p", "memory"))
             return (
-                f"is not absent at its neutral values: {law.__name__} gives {given:g} at {at} "
+                f"is not absent at its neutral values: {law.__name__} gives {result:g} at {at} "
                 f"(SI), and {expected:g} would change nothing at port {effect.port}"
-                + ("; take powers and logarithms of abs(x)" if np.isnan(given) else "")
+                + ("; take powers and logarithms of abs(x)" if np.isnan(result) else "")
             )
     return ""
 

@@ -31,14 +31,14 @@ def all_seeds(seed: int | Sequence[int | None] | None, count: int) -> list[int |
     if seed is None:
         return [None] * count
     rule = f"seed must be a whole number from 0 on, or one for each of the {count} environments"
-    given: Any = plain_scalar(seed)
-    if _is_seed(given):
-        return [given + i for i in range(count)]
-    if not isinstance(given, Sequence | np.ndarray) or isinstance(given, str):
+    plain: Any = plain_scalar(seed)
+    if _is_seed(plain):
+        return [plain + i for i in range(count)]
+    if not isinstance(plain, Sequence | np.ndarray) or isinstance(plain, str):
         raise ValueError(f"{rule}; got {seed!r}")
-    if len(given) != count:
-        raise ValueError(f"{rule}; got {len(given)}")
-    seeds = [plain_scalar(one) for one in given]
+    if len(plain) != count:
+        raise ValueError(f"{rule}; got {len(plain)}")
+    seeds = [plain_scalar(one) for one in plain]
     for one in seeds:
         if one is not None and not _is_seed(one):
             raise ValueError(f"{rule}; got {one!r} among them")
@@ -51,10 +51,10 @@ def parse_seed(seed: object) -> int | None:
     Raises:
         ValueError: with the rule and the invalid value.
     """
-    given = plain_scalar(seed)
-    if given is not None and not _is_seed(given):
+    plain = plain_scalar(seed)
+    if plain is not None and not _is_seed(plain):
         raise ValueError(f"seed must be a whole number from 0 on, or None, got {seed!r}")
-    return given
+    return plain
 
 
 def _is_seed(value: object) -> TypeGuard[int]:
@@ -120,14 +120,14 @@ class BatchActions:
     """Copy the actions of a batch to the engine, or reject invalid ones.
 
     Args:
-        given: the engine's array of actions, shape (num_envs, entries of an action).
+        inputs: the engine's array of actions, shape (num_envs, entries of an action).
 
     Attributes:
-        given: the same array.
+        inputs: the same array.
     """
 
-    def __init__(self, given: NDArray[Any]) -> None:
-        self.given = given
+    def __init__(self, inputs: NDArray[Any]) -> None:
+        self.inputs = inputs
 
     def take(self, actions: object, waiting: NDArray[np.int64] | None) -> None:
         """Copy actions to the engine; actions of ended episodes have no effect.
@@ -146,24 +146,24 @@ class BatchActions:
             raise ValueError(
                 f"{self._rule}; got {type(actions).__name__} of no real numbers"
             ) from None
-        if array.shape != self.given.shape:
+        if array.shape != self.inputs.shape:
             raise ValueError(f"{self._rule}; got shape {array.shape}")
-        self.given[:] = array
+        self.inputs[:] = array
         if waiting is not None:
-            self.given[waiting] = 0.0
+            self.inputs[waiting] = 0.0
 
     def not_finite(self) -> ValueError:
         """Return the error for actions that are not finite."""
-        row = int(np.flatnonzero(~np.isfinite(self.given).all(axis=1))[0])
+        row = int(np.flatnonzero(~np.isfinite(self.inputs).all(axis=1))[0])
         return ValueError(
             f"{self._rule}, all of them finite; environment {row} got "
-            f"{self.given[row].tolist()}; look for a division by zero or a diverged policy"
+            f"{self.inputs[row].tolist()}; look for a division by zero or a diverged policy"
         )
 
     @property
     def _rule(self) -> str:
         return (
-            f"actions must have shape {self.given.shape}: one row an environment, each entry "
+            f"actions must have shape {self.inputs.shape}: one row an environment, each entry "
             "-1 to 1 for 0 to 10 V"
         )
 
@@ -215,11 +215,11 @@ class FunctionRewards:
             value += missed * self._call(100.0, 0.0, reference + self._span, reference)
         return self._scale * value
 
-    def _call(self, *given: float) -> float:
-        value = self._reward(*given)
+    def _call(self, *step_numbers: float) -> float:
+        value = self._reward(*step_numbers)
         is_number = isinstance(value, numbers.Real) and not isinstance(value, bool | np.bool_)
         if not is_number or not math.isfinite(value):
-            error, change, position, reference = given
+            error, change, position, reference = step_numbers
             raise ValueError(
                 f"reward must be {RULE}; it returned {value!r} for error {error:g} %, change "
                 f"{change:g}, position {position:g}, reference {reference:g}"

@@ -55,8 +55,8 @@ class Copies:
 
     def __setstate__(self, state: Mapping[str, Any]) -> None:
         """Restore the attributes from `__getstate__`."""
-        given = {n: v.value() if isinstance(v, Packed) else v for n, v in state.items()}
-        self.__dict__.update(given)
+        attributes = {n: v.value() if isinstance(v, Packed) else v for n, v in state.items()}
+        self.__dict__.update(attributes)
         self._attach()
 
     def __copy__(self) -> Self:

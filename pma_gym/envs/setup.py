@@ -174,7 +174,7 @@ class SeededByReset:
 
 
 def own_seeds(
-    given: Sequence[int | None],
+    requested: Sequence[int | None],
     known: Sequence[int | None],
     indices: NDArray[np.int64],
     first: int | None,
@@ -182,7 +182,7 @@ def own_seeds(
     """Return the seeds of a batch's environments at a reset, None for those that keep their seed.
 
     Args:
-        given: for every environment, the seed given to the reset, or None.
+        requested: for every environment, the seed given to the reset, or None.
         known: for every environment, its present seed, or None.
         indices: the environments of the reset.
         first: seed of the first environment, with consecutive seeds for the others, if no seeds are
@@ -196,7 +196,7 @@ def own_seeds(
     """
     seeds = []
     for i in indices.tolist():
-        seed = given[i]
+        seed = requested[i]
         if seed is None and known[i] is None:
             seed = drawn_seed() if first is None else first + i
         seeds.append(seed)

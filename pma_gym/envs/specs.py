@@ -68,7 +68,7 @@ def completed_spec(spec: EnvSpec | None, horizon: int) -> EnvSpec | None:
     """
     if spec is None:
         return None
-    given = {
+    arguments = {
         name: value
         for name, value in spec.kwargs.items()
         if name != "max_episode_steps" or not isinstance(value, DefaultSteps)
@@ -76,4 +76,4 @@ def completed_spec(spec: EnvSpec | None, horizon: int) -> EnvSpec | None:
     steps = spec.max_episode_steps
     if steps is None or isinstance(steps, DefaultSteps):
         steps = DefaultSteps(horizon)
-    return replace(spec, kwargs=plain_options(given), max_episode_steps=min(steps, horizon))
+    return replace(spec, kwargs=plain_options(arguments), max_episode_steps=min(steps, horizon))

@@ -52,31 +52,31 @@ def _floats(parameters: Any) -> dict[str, Any]:  # noqa: ANN401
     }
 
 
-def _note(path: str, given: Any) -> Note:  # noqa: ANN401
-    source, low, high = given
+def _note(path: str, entry: Any) -> Note:  # noqa: ANN401
+    source, low, high = entry
     if not (
         isinstance(source, str) and all(isinstance(n, int | float | None) for n in (low, high))
     ):
-        raise StateError(f"the note of {path} must be a text and two numbers, got {given!r}")
+        raise StateError(f"the note of {path} must be a text and two numbers, got {entry!r}")
     return Note(source, low, high)
 
 
-def _parameters(name: str, given: Mapping[str, Any]) -> Any:  # noqa: ANN401
+def _parameters(name: str, table: Mapping[str, Any]) -> Any:  # noqa: ANN401
     effect = known_effect(name)
-    if set(given) != set(effect.quantities):
+    if set(table) != set(effect.quantities):
         raise StateError(
             f"[{name}] of a drawn station must have {', '.join(effect.quantities)}, got "
-            f"{', '.join(map(str, given))}"
+            f"{', '.join(map(str, table))}"
         )
     for field, quantity in effect.quantities.items():
         many = field in effect.rows
-        numbers = given[field] if many else [given[field]]
+        numbers = table[field] if many else [table[field]]
         if not isinstance(numbers, list) or not all(_within(quantity, one) for one in numbers):
             raise StateError(
                 f"{name}.{quantity.name(field)} of a drawn station must lie in "
-                f"{quantity.lower:g}-{quantity.upper:g} {quantity.unit}, got {given[field]!r} in SI"
+                f"{quantity.lower:g}-{quantity.upper:g} {quantity.unit}, got {table[field]!r} in SI"
             )
-    values = {f: tuple(v) if isinstance(v, list) else v for f, v in given.items()}
+    values = {f: tuple(v) if isinstance(v, list) else v for f, v in table.items()}
     return effect.checked(effect.parameters(**values))
 
 
@@ -198,9 +198,11 @@ class EnvState(NamedTuple):
 
     @classmethod
     def _parsed(cls, document: dict[str, Any]) -> "EnvState":
-        given = dict(document["simulation"])
-        models = tuple(None if m is None else parse_model_document(m) for m in given.pop("models"))
-        arrays = {name: _decoded(value) for name, value in given.items()}
+        simulation = dict(document["simulation"])
+        models = tuple(
+            None if m is None else parse_model_document(m) for m in simulation.pop("models")
+        )
+        arrays = {name: _decoded(value) for name, value in simulation.items()}
         generator = document["generator"]
         return cls(
             tuple((str(name), str(value)) for name, value in document["setup"].items()),
@@ -248,15 +250,15 @@ def _check_rest(state: EnvState, count: int) -> None:
             f"begun, ended and seeds of a state must have {count} entries here, seeds being whole "
             "numbers from 0 on: the state is damaged; take it anew with get_state()"
         )
-    given, limits = state.generator, (1 << 128, 1 << 128, 2, 1 << 32)
-    if given is not None and not (
-        isinstance(given, tuple)
-        and len(given) == len(limits)
-        and all(type(n) is int and 0 <= n < end for n, end in zip(given, limits, strict=True))
+    generator, limits = state.generator, (1 << 128, 1 << 128, 2, 1 << 32)
+    if generator is not None and not (
+        isinstance(generator, tuple)
+        and len(generator) == len(limits)
+        and all(type(n) is int and 0 <= n < end for n, end in zip(generator, limits, strict=True))
     ):
         raise StateError(
             "generator of a state must be None or the four whole numbers of a PCG64, got "
-            f"{given!r}: the state is damaged; take it anew with get_state()"
+            f"{generator!r}: the state is damaged; take it anew with get_state()"
         )
     if not isinstance(state.ended_by, str | None):
         raise StateError(f"ended_by of a state must be words or None, got {state.ended_by!r}")

@@ -172,10 +172,14 @@ class PMAVectorEnv(
             TypeError: an unknown option.
             ValueError: a pressure out of range, or seeds, pressures or a mask of another length.
         """
-        given = dict(options or {})
-        check_known("reset option", given, RESET_OPTIONS)
-        indices = masked(given["reset_mask"], self.num_envs) if "reset_mask" in given else self._all
-        wanted = wanted_pressures(given, indices, self.num_envs, self.engine.nominal_model)
+        requested = dict(options or {})
+        check_known("reset option", requested, RESET_OPTIONS)
+        indices = (
+            masked(requested["reset_mask"], self.num_envs)
+            if "reset_mask" in requested
+            else self._all
+        )
+        wanted = wanted_pressures(requested, indices, self.num_envs, self.engine.nominal_model)
         seeds = self._own_seeds(all_seeds(self._or_drawn(seed), self.num_envs), indices)
         # Should it fail on the way, these have no episode.
         self._begun[indices], self._idle = False, True
@@ -187,13 +191,13 @@ class PMAVectorEnv(
         return self.engine.observations.copy(), {}
 
     def _own_seeds(
-        self, given: Sequence[int | None], indices: NDArray[np.int64]
+        self, requested: Sequence[int | None], indices: NDArray[np.int64]
     ) -> list[int | None]:
         """Seeds for the engine, in the order of indices; `np_random` begins anew with the first."""
-        super().reset(seed=given[0])
-        fresh = not any(seed is not None for seed in (*given, *self._seeds))
+        super().reset(seed=requested[0])
+        fresh = not any(seed is not None for seed in (*requested, *self._seeds))
         first = VectorEnv.np_random_seed.fget(self) if fresh else None  # type: ignore[attr-defined]
-        seeds = own_seeds(given, self._seeds, indices, first)
+        seeds = own_seeds(requested, self._seeds, indices, first)
         known = list(self._seeds)
         for i, seed in zip(indices.tolist(), seeds, strict=True):
             known[i] = known[i] if seed is None else seed

@@ -116,18 +116,18 @@ def _entries(b: Builder, table: Operand, names: Sequence[str]) -> dict[str, Oper
 _ADDRESSES = ("signals", "scratch", "out", "simulated", "measured", "weights")
 
 
-def _multiply(b: Builder, given: dict[str, Operand]) -> None:
+def _multiply(b: Builder, arguments: dict[str, Operand]) -> None:
     """Write the products of one job; sums stand behind the differences in its scratch memory."""
     simd = SimdEmitter(LANES)
-    scratch, rows = given["scratch"], given["rows"]
-    size = b.add(given["moved"], integer(1))
+    scratch, rows = arguments["scratch"], arguments["rows"]
+    size = b.add(arguments["moved"], integer(1))
     pairs = b.sdiv(b.mul(size, b.add(size, integer(1))), integer(2))
     with loop(b, pairs) as pair:
         simd.store(b, simd.constant(0.0), scratch, b.add(size, pair))
-    with loop(b, rows, 0, LANES) as first, loop(b, given["channels"]) as channel:
+    with loop(b, rows, 0, LANES) as first, loop(b, arguments["channels"]) as channel:
         at = b.mul(channel, integer(len(_SIGNAL)))
-        own = _entries(b, offset(b, given["signals"], at, INTEGER), _SIGNAL)
-        _differ(b, simd, {**given, **own}, first, size)
+        own = _entries(b, offset(b, arguments["signals"], at, INTEGER), _SIGNAL)
+        _differ(b, simd, {**arguments, **own}, first, size)
         with loop(b, size) as i:
             one, start = simd.load(b, scratch, i), b.add(size, _before(b, i))
             with loop(b, b.add(i, integer(1))) as j:
@@ -140,7 +140,7 @@ def _multiply(b: Builder, given: dict[str, Operand]) -> None:
         while len(parts) > 1:
             parts = [b.fadd(one, other) for one, other in zip(parts[::2], parts[1::2], strict=True)]
         for row, column in ((i, j), (j, i)):
-            b.store(parts[0], offset(b, given["out"], b.add(b.mul(row, size), column)))
+            b.store(parts[0], offset(b, arguments["out"], b.add(b.mul(row, size), column)))
 
 
 def _before(b: Builder, row: Operand) -> Operand:
@@ -149,14 +149,14 @@ def _before(b: Builder, row: Operand) -> Operand:
 
 
 def _differ(
-    b: Builder, simd: SimdEmitter, given: dict[str, Operand], first: Operand, size: Operand
+    b: Builder, simd: SimdEmitter, arguments: dict[str, Operand], first: Operand, size: Operand
 ) -> None:
     """Write the differences of some rows into scratch memory, weighted."""
     rows = [b.add(first, integer(k)) for k in range(LANES)]
-    inside = [b.icmp_signed("<", row, given["rows"]) for row in rows]
-    last = b.sub(given["rows"], integer(1))
+    inside = [b.icmp_signed("<", row, arguments["rows"]) for row in rows]
+    last = b.sub(arguments["rows"], integer(1))
     rows = [b.select(there, row, last) for row, there in zip(rows, inside, strict=True)]
-    steps = [b.mul(row, given["step"]) for row in rows]
+    steps = [b.mul(row, arguments["step"]) for row in rows]
     none, half = real(0.0), simd.constant(0.5)
 
     def gathered(numbers: Sequence[Operand]) -> Operand:
@@ -166,10 +166,10 @@ def _differ(
         return vector
 
     def column(name: str) -> list[Operand]:
-        return [b.load(offset(b, given[name], row), typ=DOUBLE) for row in rows]
+        return [b.load(offset(b, arguments[name], row), typ=DOUBLE) for row in rows]
 
     def signal(number: Operand) -> Operand:
-        start = offset(b, given["simulated"], b.mul(number, given["run"]))
+        start = offset(b, arguments["simulated"], b.mul(number, arguments["run"]))
         return gathered([b.load(offset(b, start, step), typ=DOUBLE) for step in steps])
 
     weighing = zip(column("weights"), inside, strict=True)
@@ -179,16 +179,16 @@ def _differ(
     def keep(number: Operand | int, difference: Operand) -> None:
         # What counts for nothing may be no number.
         weighted = b.select(counts, b.fmul(difference, weights), simd.constant(0.0))
-        simd.store(b, weighted, given["scratch"], number)
+        simd.store(b, weighted, arguments["scratch"], number)
 
     as_it_is = signal(integer(0))
     keep(0, b.fsub(as_it_is, gathered(column("measured"))))
-    is_central = b.icmp_signed(">", given["tried"], size)
+    is_central = b.icmp_signed(">", arguments["tried"], size)
     with loop(b, size, 1) as k:
         moved = signal(k)
         with b.if_else(is_central) as (both, forwards):
             with both:
-                back = signal(b.add(k, given["moved"]))
+                back = signal(b.add(k, arguments["moved"]))
                 keep(k, b.fmul(half, b.fsub(moved, back)))
             with forwards:
                 keep(k, b.fsub(moved, as_it_is))

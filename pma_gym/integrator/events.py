@@ -251,8 +251,8 @@ def _passed_twice(
     least = event.overshoot * (10.0 if event.turning else 1.0)
     crossed = []
     for states in made.visited:
-        given = {state.value.id: value for state, value in zip(leading, states, strict=True)}
-        (there,) = substitute([event.value], {**frozen, **given})
+        known = {state.value.id: value for state, value in zip(leading, states, strict=True)}
+        (there,) = substitute([event.value], {**frozen, **known})
         beyond = (-0.25 * sign) * there
         crossed.append((beyond * length if event.turning else beyond) > least)
     return crossed[0] | crossed[1]

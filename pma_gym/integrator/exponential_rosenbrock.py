@@ -283,10 +283,12 @@ def step(
     )
 
 
-def substituted(jacobian: list[list[Entry]], given: Mapping[int, Value]) -> list[list[Entry]]:
+def substituted(
+    jacobian: list[list[Entry]], replacements: Mapping[int, Value]
+) -> list[list[Entry]]:
     """A matrix with values in the place of others, by id."""
     present = [entry for row in jacobian for entry in row if entry is not None]
-    results = iter(substitute(present, given))
+    results = iter(substitute(present, replacements))
     return [[None if entry is None else next(results) for entry in row] for row in jacobian]
 
 

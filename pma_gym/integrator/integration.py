@@ -147,14 +147,14 @@ class Lane:
             where = offset(self.builder, table, offsets[value.id] * spacing)
             self.put(value, lane, self.narrow(self.builder.load(where, typ=DOUBLE)))
 
-    def hold(self, lane: Operand, given: dict[int, Operand]) -> None:
+    def hold(self, lane: Operand, inputs: dict[int, Operand]) -> None:
         """Write what follows for a span, once the table is there.
 
         Args:
             lane: number of the lane.
-            given: inputs of level HELD, by id.
+            inputs: inputs of level HELD, by id.
         """
-        known = {value.id: self.get(value, lane) for value in self.layout.fixed} | given
+        known = {value.id: self.get(value, lane) for value in self.layout.fixed} | inputs
         emitted = self.one.emit(self.builder, self.layout.held, known)
         for value in self.layout.held:
             self.put(value, lane, emitted[value.id])

@@ -72,9 +72,9 @@ class PlantEquations(Equations):
         start, parameters = self[name], self.parameters[effect.name]
         direction = self["direction"]
         self.travel = self.travelled[0] - self["origin"]
-        given = {"memory": start, "travel": self._travel_of(effect), "direction": direction}
+        inputs = {"memory": start, "travel": self._travel_of(effect), "direction": direction}
         law = effect.rate_independent_law
-        after = trace(law, *({**given, "p": parameters}[name] for name in signals(law)))
+        after = trace(law, *({**inputs, "p": parameters}[name] for name in signals(law)))
         state = RateIndependentState(name, start, after, effect.memory_scale)
         self.rate_independent_states.append(state)
         if effect.path_breakpoint:

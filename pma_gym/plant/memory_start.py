@@ -72,8 +72,8 @@ def begun_at(model: Model, memory_at_start: float | None) -> Model:
 
 def first_guesses(trials: Sequence[Trial]) -> Array:
     """Initial states for simulations of trials: from the trial, else the middle of the range."""
-    given = [trial.memory_at_start for trial in trials]
-    return np.array([MIDDLE if one is None else one for one in given], float)
+    stated = [trial.memory_at_start for trial in trials]
+    return np.array([MIDDLE if one is None else one for one in stated], float)
 
 
 def reach(trial: Trial) -> tuple[float, float]:

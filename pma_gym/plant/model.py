@@ -102,16 +102,16 @@ class Model:
         Raises:
             ModelError: an unknown parameter (with the nearest known name) or one out of bounds.
         """
-        given: dict[str, dict[str, Value]] = {}
+        changes: dict[str, dict[str, Value]] = {}
         known = set(self.paths())
         for path, value in values.items():
             if path not in known:
                 raise ModelError(f"model {self.name} has no parameter {path}{self._nearest(path)}")
             effect, _, parameter = path.partition(".")
-            given.setdefault(effect, {})[parameter] = value
+            changes.setdefault(effect, {})[parameter] = value
         parameters = dict(self.parameters)
         try:
-            for effect, changed in given.items():
+            for effect, changed in changes.items():
                 parameters[effect] = CATALOGUE[effect].changed(parameters[effect], changed)
         except ValueError as error:
             raise ModelError(str(error)) from error
@@ -138,14 +138,14 @@ class Model:
         """
         if isinstance(effects, str):
             raise ModelError(f"with_effects takes a list of names or a dict, got {effects!r}")
-        given = effects if isinstance(effects, Mapping) else dict.fromkeys(effects, {})
+        requested = effects if isinstance(effects, Mapping) else dict.fromkeys(effects, {})
         parameters = dict(self.parameters)
-        for effect, values in given.items():
+        for effect, values in requested.items():
             parameters[effect] = self._added(effect, values)
         kept = {
             path: note
             for path, note in self.notes.items()
-            if path.partition(".")[2] not in given.get(path.partition(".")[0], {})
+            if path.partition(".")[2] not in requested.get(path.partition(".")[0], {})
         }
         return replace(self, name=name or self.name, parameters=parameters, notes=kept)
 
@@ -310,8 +310,8 @@ def _split(effect: str, table: object) -> tuple[dict[str, Value], dict[str, Note
     if not isinstance(table, dict):
         raise ModelError(f"{effect} = {_shown(table)} is no table; parameters stand under [effect]")
     values, notes = {}, {}
-    for name, given in table.items():
-        entry = given if isinstance(given, dict) else {"value": given}
+    for name, content in table.items():
+        entry = content if isinstance(content, dict) else {"value": content}
         low, high = entry.get("low"), entry.get("high")
         if (
             not {"value"} <= set(entry) <= {"value", "low", "high", "source"}
@@ -320,7 +320,7 @@ def _split(effect: str, table: object) -> tuple[dict[str, Value], dict[str, Note
         ):
             raise ModelError(
                 f"{effect}.{name} must be a number, or a table of value, low and high (numbers) "
-                f"and source (text); got {_shown(given)}"
+                f"and source (text); got {_shown(content)}"
             )
         values[name] = entry["value"]
         notes[f"{effect}.{name}"] = Note(entry.get("source", ""), low, high)

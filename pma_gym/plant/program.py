@@ -186,14 +186,14 @@ class Program:
             [("count", INTEGER), ("states", POINTER), ("inputs", POINTER)]
             + [("vectors", POINTER), ("stride", INTEGER), ("out", POINTER)],
         )
-        rates, given = self.rates(), (*COMMANDS, ZERO)
+        rates, input_names = self.rates(), (*COMMANDS, ZERO)
         with loop(b, count) as row:
             known = self.parameters(b, offset(b, vectors, b.mul(row, stride)), rates)
             for i, entry in enumerate(eq.remembered):
                 where = b.add(b.mul(row, integer(len(eq.remembered))), integer(i))
                 known[entry.value.id] = b.load(offset(b, states, where), typ=DOUBLE)
-            for i, name in enumerate(given):
-                where = b.add(b.mul(row, integer(len(given))), integer(i))
+            for i, name in enumerate(input_names):
+                where = b.add(b.mul(row, integer(len(input_names))), integer(i))
                 known[eq[name].id] = b.load(offset(b, inputs, where), typ=DOUBLE)
             emitted = SimdEmitter(1).emit(b, rates, known)
             for i, rate in enumerate(rates):

@@ -159,7 +159,7 @@ def imposed_record(model: Model, trial: Trial) -> np.ndarray:
         TrialError: without any, and with too few rows for the motion's bandwidth.
     """
     (name,) = model.rig.direct_commands.values()
-    positions = _given(trial, name)
+    positions = _commanded(trial, name)
     if positions is None:
         raise TrialError(
             f"the trial has no motion: give {BY_QUANTITY[name].name}, the position that the drive "
@@ -180,7 +180,7 @@ def _imposed(model: Model, trial: Trial) -> tuple[np.ndarray, np.ndarray]:
     line = model.parameters.get("regulator_line")
     if line is not None:
         return motion, _voltage(trial, "regulator_voltage", "pressure_command", line)
-    pressure = _given(trial, "pressure_command")
+    pressure = _commanded(trial, "pressure_command")
     if pressure is None:
         return motion, np.zeros(len(motion))
     return motion, level_command(trial.time, pressure, *smooth)
@@ -199,7 +199,7 @@ def _check_bandwidth(trial: Trial, bandwidth: float) -> None:
         )
 
 
-def _given(trial: Trial, command: str) -> np.ndarray | None:
+def _commanded(trial: Trial, command: str) -> np.ndarray | None:
     """A command (SI), or what was measured of it; linear over empty cells, None if all are."""
     for values in (
         trial.commands.get(command),
@@ -213,13 +213,13 @@ def _given(trial: Trial, command: str) -> np.ndarray | None:
 
 def _direct(trial: Trial, name: str) -> np.ndarray:
     """A command that a drive takes as it comes (SI)."""
-    given = _command(trial, name)
-    if given is None:
+    values = _command(trial, name)
+    if values is None:
         raise TrialError(
             f"the trial does not command the drive: give {BY_QUANTITY[name].name}, which this "
             "model's drive takes"
         )
-    return given
+    return values
 
 
 def _voltage(
@@ -229,9 +229,9 @@ def _voltage(
 
     What is wished for is not below a least value, whatever the line gives at 0 V.
     """
-    given = _command(trial, voltage)
-    if given is not None:
-        return given
+    values = _command(trial, voltage)
+    if values is not None:
+        return values
     wished = _command(trial, wish)
     if wished is None or line is None:
         choice = f"{voltage}_v or {BY_QUANTITY[wish].name}" if line else f"{voltage}_v"

@@ -134,11 +134,11 @@ def simulate_all(program: Program, runs: Sequence[Run], threads: int = 1) -> int
         starts[i, :count], starts[i, count:] = run.state, (run.size, run.zero_contraction)
         if run.states.shape != (rows, count):
             run.states = np.empty((rows, count))
-        given = map(address, (run.time, run.motor, run.regulator, run.table))
+        addresses = map(address, (run.time, run.motor, run.regulator, run.table))
         jobs[i] = (
             rows,
             run.interpolation == "foh",
-            *given,
+            *addresses,
             where + i * apart,
             run.states.ctypes.data,
         )

@@ -57,10 +57,10 @@ def span(
         The span; None where no pressure allows the angle: the muscle is too short for the pulley.
     """
     pressure = pressure_grid(model)
-    given = resistive_moment(model, device, pressure, angle, rest_pressure)
-    if not given.allowed.any():
+    result = resistive_moment(model, device, pressure, angle, rest_pressure)
+    if not result.allowed.any():
         return None
-    moment, usable = given.moment[given.allowed], pressure[given.allowed]
+    moment, usable = result.moment[result.allowed], pressure[result.allowed]
     return Span(float(moment.min()), float(moment.max()), float(usable[0]), float(usable[-1]))
 
 
@@ -77,8 +77,8 @@ def lowest_rest_pressure(model: Model, device: Device, step: float = 25e3) -> fl
         The pressure; None if none of the model's validity serves.
     """
     rests = pressure_grid(model, step)
-    given = resistive_moment(model, device, rests[None, :], FULL_ANGLE, rests[:, None])
-    serving = rests[given.allowed.all(axis=1)]
+    result = resistive_moment(model, device, rests[None, :], FULL_ANGLE, rests[:, None])
+    serving = rests[result.allowed.all(axis=1)]
     return float(serving[0]) if len(serving) else None
 
 

@@ -181,8 +181,8 @@ class _Balance:
         pull = self._force(rest - wound, self._held)
         # The cable gives way by a few hundredths of the extension: four rounds are plenty.
         for _ in range(4 if self.rotates else 0):
-            given = cable.slack + np.maximum(pull, 0.0) / cable.stiffness
-            pull = self._force(rest - np.maximum(wound - given, 0.0), self._held)
+            stretch = cable.slack + np.maximum(pull, 0.0) / cable.stiffness
+            pull = self._force(rest - np.maximum(wound - stretch, 0.0), self._held)
         if np.any(pull < -ROUNDING_N):
             return f"the cable would have to push {_when(pull < -ROUNDING_N)}"
         return _beyond("motor", (pull - drive.offset) / drive.gain)

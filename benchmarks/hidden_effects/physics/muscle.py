@@ -138,16 +138,18 @@ class Dashpots(Hidden):
     def __init__(self, spring: Array, times: tuple[float, ...]) -> None:
         """Take stiffness (N/m) of all lanes, shared by branches of these time constants (s)."""
         self.spring, self.times = spring, np.array(times)[:, None]
-        self.given = np.zeros(0)
+        self.positions = np.zeros(0)
 
     def begin(self, moment: Moment) -> None:
         """All dashpots have given way to where the muscle rests."""
-        self.given = np.repeat(moment.contraction[None, :], len(self.times), axis=0)
+        self.positions = np.repeat(moment.contraction[None, :], len(self.times), axis=0)
 
     def force(self, moment: Moment) -> Array:
         """Force of the springs that the dashpots have not yet relieved."""
-        self.given = self.given + moment.step * (moment.contraction - self.given) / self.times
-        return -self.spring * (moment.contraction - self.given.mean(axis=0))
+        self.positions = (
+            self.positions + moment.step * (moment.contraction - self.positions) / self.times
+        )
+        return -self.spring * (moment.contraction - self.positions.mean(axis=0))
 
 
 class WarmUp(Hidden):

@@ -256,8 +256,8 @@ def _done(b: Builder, pool: Operand) -> None:
 
 def _write_work(module: ir.Module) -> None:
     """Do what nobody has taken on."""
-    given = [*_BOARD[1:], ("own", INTEGER)]
-    b, (shares, threads, own) = function(module, "work", given)
+    parameters = [*_BOARD[1:], ("own", INTEGER)]
+    b, (shares, threads, own) = function(module, "work", parameters)
     pool = variable(b, ir.ArrayType(INTEGER, FROM + 1))
     pool.type = POINTER
     another = b.ptrtoint(module.get_global("another"), INTEGER)
@@ -283,8 +283,8 @@ def _write_work(module: ir.Module) -> None:
 
 def _write_serve(module: ir.Module) -> None:
     """Work whenever there is any; return the number of works seen once there is none for long."""
-    given = [*_BOARD, ("own", INTEGER), ("spins", INTEGER), ("seen", INTEGER)]
-    b, (works, shares, threads, own, spins, before) = function(module, "serve", given, INTEGER)
+    parameters = [*_BOARD, ("own", INTEGER), ("spins", INTEGER), ("seen", INTEGER)]
+    b, (works, shares, threads, own, spins, before) = function(module, "serve", parameters, INTEGER)
     left, seen = variable(b, INTEGER, spins), variable(b, INTEGER, before)
     with repeat(b) as leave_if:
         now = _now(b, works, 0)

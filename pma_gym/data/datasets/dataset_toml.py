@@ -240,14 +240,14 @@ def _sizes(document: Mapping[str, Any], key: str, example: str) -> dict[str, flo
     return sizes
 
 
-def _model(folder: Path, given: str | None) -> str | None:
+def _model(folder: Path, name: str | None) -> str | None:
     """The model's name, or its file as seen from here."""
-    if given is None or not (given.endswith(".toml") or "/" in given or "\\" in given):
-        return given
-    path = folder / given
+    if name is None or not (name.endswith(".toml") or "/" in name or "\\" in name):
+        return name
+    path = folder / name
     if not is_file(path):
         raise TrialError(
-            f"model in {DESCRIPTION} is {given!r}, but there is no file {path}; a path counts "
+            f"model in {DESCRIPTION} is {name!r}, but there is no file {path}; a path counts "
             "from the data set's folder"
         )
     return str(path)
@@ -274,8 +274,8 @@ def _trials(tables: Mapping[str, Any], files: Sequence[str]) -> dict[str, dict[s
 
 
 def _check_order(place: str, order: object) -> None:
-    given = order if isinstance(order, int | float) and not isinstance(order, bool) else math.nan
-    if not math.isfinite(given):
+    number = order if isinstance(order, int | float) and not isinstance(order, bool) else math.nan
+    if not math.isfinite(number):
         raise TrialError(
             f"order in {place} must be a number, the larger the later it was measured, got "
             f"{_shown(order)}; write order = 1 for the first"

@@ -85,14 +85,14 @@ def gaps(trial: Trial) -> list[Gap]:
 
 def _without_command(name: str, values: Array, time: Array, limit: float) -> Iterator[Gap]:
     """Where a command that rows give regularly is not given for long, and changes meanwhile."""
-    given = np.flatnonzero(np.isfinite(values))
-    apart = np.diff(given)
+    known = np.flatnonzero(np.isfinite(values))
+    apart = np.diff(known)
     usual = np.median(apart) if apart.size else 0.0
-    if 2 * given.size <= values.size and np.mean(apart == usual) < REGULAR:
+    if 2 * known.size <= values.size and np.mean(apart == usual) < REGULAR:
         return
-    limit = max(limit, TIMES * float(np.median(np.diff(time[given]))))
-    span = float(np.ptp(values[given]))
-    for last, first in zip(given, given[1:], strict=False):
+    limit = max(limit, TIMES * float(np.median(np.diff(time[known]))))
+    span = float(np.ptp(values[known]))
+    for last, first in zip(known, known[1:], strict=False):
         if first - last < 2 or time[first] - time[last] <= limit:
             continue
         around = values[max(0, last - 3) : first + 4]

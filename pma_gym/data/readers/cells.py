@@ -60,13 +60,13 @@ def decimal_mark(columns: Iterable[Cells]) -> str:
     return "," if comma else "."
 
 
-def has_groups(cells: Cells, mark: str, given: bool = False) -> bool:
+def has_groups(cells: Cells, mark: str, stated: bool = False) -> bool:
     """Test whether a column's numbers have grouped thousands.
 
     Args:
         cells: of the column.
         mark: the file's decimal mark.
-        given: whether the lab states it: then the other mark can only group.
+        stated: whether the lab states it: then the other mark can only group.
     Returns:
         True where one cell shows both marks, or two groups: `3,785.9` and `1,234,567` can be read
         in one way; `3,785` alone in two.
@@ -75,7 +75,7 @@ def has_groups(cells: Cells, mark: str, given: bool = False) -> bool:
     for cell in cells:
         if isinstance(cell, str) and other in cell and len(cell) <= _LONGEST:
             bare = bare_text(cell)
-            sure = given or mark in bare or bare.count(other) > 1
+            sure = stated or mark in bare or bare.count(other) > 1
             if sure and _GROUPS[mark].fullmatch(bare):
                 return True
     return False

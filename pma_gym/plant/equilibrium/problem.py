@@ -114,8 +114,8 @@ class EquilibriumProblem:
             inputs[:, 2] = zero
         out = np.empty_like(self.state)
         commands, at = inputs.ctypes.data, out.ctypes.data
-        given = self._state_at, commands, self._numbers_at, self._stride
-        self.plant.program.derivative(len(out), *given, at)
+        arguments = self._state_at, commands, self._numbers_at, self._stride
+        self.plant.program.derivative(len(out), *arguments, at)
         return out[:, self.names[name]]
 
     def output(self, name: str) -> np.ndarray:

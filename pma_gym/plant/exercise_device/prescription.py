@@ -97,8 +97,11 @@ def hold(model: Model, device: Device, moment: float) -> Held:
         UnreachableError: no pressure gives the moment, or none allows 90 deg.
     """
     pressure = pressure_grid(model)
-    given = resistive_moment(model, device, pressure, FULL_ANGLE)
-    at, moments = pressure[given.allowed], given.moment[given.allowed]
+    moments_by_pressure = resistive_moment(model, device, pressure, FULL_ANGLE)
+    at, moments = (
+        pressure[moments_by_pressure.allowed],
+        moments_by_pressure.moment[moments_by_pressure.allowed],
+    )
     miss = _miss(device, FULL_ANGLE, moment, at, moments)
     if miss is not None:
         raise UnreachableError(miss)
@@ -205,15 +208,15 @@ def _scheduled(
     """Pressures over the angle with one setting of the cable, or where it fails most."""
     pressure = pressure_grid(model, _GRID)
     columns = angle[:, None]
-    given = resistive_moment(model, device, pressure, columns, rest_pressure, rest_moment)
+    result = resistive_moment(model, device, pressure, columns, rest_pressure, rest_moment)
     pressures = [
         _miss(device, a, m, pressure[ok], row[ok])
-        for a, m, row, ok in zip(angle, moment, given.moment, given.allowed, strict=True)
+        for a, m, row, ok in zip(angle, moment, result.moment, result.allowed, strict=True)
     ]
     missed = [miss for miss in pressures if miss is not None]
     if missed:
         return max(missed, key=lambda miss: miss.distance)
-    rows = zip(moment, given.moment, given.allowed, strict=True)
+    rows = zip(moment, result.moment, result.allowed, strict=True)
     read = [np.interp(m, row[ok], pressure[ok]) for m, row, ok in rows]
     return Schedule(rest_pressure, np.array(read))
 

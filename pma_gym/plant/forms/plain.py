@@ -119,8 +119,8 @@ class PlainPlant:
         left, zero = duration, condition.zero_contraction
         condition.receive(motor_voltage, regulator_voltage)
         while left > 0.0:
-            given = (motor_voltage, regulator_voltage)
-            made = self.attempt(condition.state, given, zero, condition.size, left)
+            voltages = (motor_voltage, regulator_voltage)
+            made = self.attempt(condition.state, voltages, zero, condition.size, left)
             condition.state[:], condition.size = made.state, made.size
             if made.accepted:
                 left -= made.length

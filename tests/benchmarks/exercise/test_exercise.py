@@ -73,7 +73,7 @@ def test_the_smallest_configuration_for_a_moment(tmp_path, moment, device):
     answer = run_exercise(Choice(), held(moment), tmp_path, Console(quiet=True))
     model = load_model("station")
     assert answer.device == Device(muscles(*device), own_device(model).radius)
-    given = resistive_moment(model, answer.device, answer.given.pressure, FULL_ANGLE).moment
+    given = resistive_moment(model, answer.device, answer.setting.pressure, FULL_ANGLE).moment
     assert given == pytest.approx(moment, rel=1e-3)
     assert ("extrapolation" in answer.how) == (device != (1, 20, 250))
     assert answer.words in (tmp_path / "report.md").read_text()
@@ -94,7 +94,7 @@ def test_a_short_muscle_serves_a_profile_that_ends_early(tmp_path):
         Choice("1", "20", "150"), read_profile(path), tmp_path, Console(quiet=True)
     )
     assert answer.device.muscles == muscles(1, 20, 150)
-    device, given = answer.device, answer.given
+    device, given = answer.device, answer.setting
     angle, model = answer.wanted.angle, load_model("station")
     held_there = resistive_moment(model, device, given.pressure, angle, given.rest_pressure)
     assert held_there.moment == pytest.approx(answer.wanted.moment, rel=0.01)
