@@ -3,9 +3,6 @@
 import ast
 import ctypes
 import gc
-import os
-import subprocess
-import sys
 import threading
 import time
 from pathlib import Path
@@ -201,20 +198,3 @@ def test_other_threads_run_during_a_call(folder):
     time.sleep(0.01)
     assert thread.is_alive()
     thread.join()
-
-
-def test_a_fresh_process_finds_what_another_kept_without_tracing(folder):
-    code = (
-        "import ctypes, sys\n"
-        "from pma_gym.codegen.machine.native import compiled\n"
-        f"library = compiled(['x'], lambda: {text()!r})\n"
-        "run = library.function('scaled', [ctypes.c_double], ctypes.c_double)\n"
-        "print(library.was_kept, run(2.0), 'pma_gym.codegen.graph' in sys.modules)"
-    )
-    env = {**os.environ, "PMA_GYM_CACHE": str(folder.parent)}
-    for kept in ("False", "True"):
-        done = subprocess.run(
-            [sys.executable, "-c", code], env=env, capture_output=True, text=True, check=False
-        )
-        assert done.returncode == 0, done.stderr
-        assert done.stdout.split()[:2] == [kept, "4.0"]

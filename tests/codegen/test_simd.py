@@ -185,16 +185,6 @@ def test_strict_code_rounds_twice_and_fused_code_once(run_columns):
                 assert column[i] == float(sign * product + own * Fraction(z[i]))
 
 
-def test_a_product_that_is_asked_for_itself_is_not_fused(run_columns):
-    graph = Graph()
-    a, b, c = (graph.input(name, CHANGING) for name in "abc")
-    given = {name: np.random.default_rng(3).normal(size=64) for name in "abc"}
-    x, y, z = given.values()
-    product, total = run_columns([a * b, a * b + c], given, 8, fused=True)
-    np.testing.assert_array_equal(product, x * y)
-    np.testing.assert_array_equal(total, x * y + z)
-
-
 def test_wide_registers_are_used_where_there_are_some(build_columns):
     features = llvm.get_host_cpu_features()
     if not features.get("avx512f"):

@@ -75,23 +75,11 @@ def test_what_does_not_balance_is_named(drawn):
         begun(nominal, [strong], PRESSURES[:1])
 
 
-def test_episodes_do_not_tell_whether_a_rest_was_kept():
-    stations = Stations("robust", 0, 2)
-    options = stations.options
-    envs = PMAVectorEnv(4, "displacement", pressure_kpa=[150.0, 300.0], **options)
-    first, _ = envs.reset(seed=3)
-    again, _ = envs.reset(seed=3)
-    assert reset_state._KEPT and first.tobytes() == again.tobytes()
-
-
-@pytest.mark.parametrize("task", ["displacement", "rotation"])
 @pytest.mark.parametrize(
-    "options",
+    ("task", "options"),
     [
-        {},
-        {"action_delay_s": 0.02, "regulator_action": True, "noise": False},
-        {"pressure_kpa": [200, 312.5, 400]},
-        {"pressure_kpa": 250},
+        ("displacement", {"pressure_kpa": [200, 312.5, 400]}),
+        ("rotation", {"action_delay_s": 0.02, "regulator_action": True, "noise": False}),
     ],
 )
 def test_compiled_beginnings_are_those_of_a_search_bit_for_bit(task, options):

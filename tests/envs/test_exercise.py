@@ -3,7 +3,6 @@
 import math
 from dataclasses import replace
 
-import gymnasium as gym
 import numpy as np
 import pytest
 
@@ -19,7 +18,6 @@ from pma_gym.tasks import (
     PACE,
     PACED,
     PACING,
-    Operator,
     OperatorState,
     moment_exercise,
     phase_rmse,
@@ -42,7 +40,7 @@ def held(env: PMAEnv, seconds: float = 100.0) -> list[dict]:
 
 @pytest.mark.parametrize(
     ("model", "name"),
-    [*(("station", name) for name in EXERCISES), ("serres2008", "isotonic_exercise")],
+    [("station", name) for name in EXERCISES],
 )
 def test_nothing_moves_before_the_operator_reacts_to_the_cue(name, model):
     # A unit step of the pressure would move the joint; a balance does not.
@@ -83,15 +81,6 @@ def test_who_gives_what_the_device_takes_turns_the_joint_as_he_means_to(pressure
     # Dry friction, and what hysteresis loses as the joint comes back a little: 0.135 N m measured.
     free = radius * (part["coulomb_friction"].static + 0.2 * hysteresis.force)
     assert end_of_hold["moment_nm"] == pytest.approx(moment, abs=free)
-
-
-def test_half_the_effort_gives_half_the_moment():
-    moments = []
-    for effort in (0.5, 1.0):
-        env = PMAEnv("isokinetic_exercise", operator=EXACT._replace(effort=effort))
-        env.reset(seed=0, options={"pressure_kpa": 300})
-        moments.append([info["operator_nm"] for info in held(env, 9.0)])
-    np.testing.assert_allclose(moments[0], 0.5 * np.array(moments[1]), rtol=1e-12)
 
 
 @pytest.mark.parametrize("name", EXERCISES)
@@ -185,7 +174,7 @@ def test_a_heavier_leg_swings_more_slowly():
 
 
 def test_the_excess_is_the_moment_less_what_is_prescribed():
-    env = PMAEnv("profile_exercise", control_rate_hz=96.0, noise=False)
+    env = PMAEnv("profile_exercise", control_rate_hz=96.0)
     env.reset(seed=2)
     infos = held(env, 6.0)
     plan = env.task.exercise.prescription
@@ -224,11 +213,13 @@ def test_scores_are_those_of_the_course(name):
     assert last["pace_rmse_deg"] == pytest.approx(pace, rel=1e-9)
 
 
-@pytest.mark.parametrize(("name", "threads"), [*zip(EXERCISES, (1, 2, 2), strict=True)])
-def test_many_are_as_one(name, threads):
-    envs = PMAVectorEnv(19, name, threads=threads, randomisation="varied", history=2)
+@pytest.mark.parametrize(
+    ("name", "how"), [*zip(EXERCISES, ("varied", "none", "none"), strict=True)]
+)
+def test_many_are_as_one(name, how):
+    envs = PMAVectorEnv(19, name, threads=2, randomisation=how)
     together, _ = envs.reset(seed=40)
-    single = PMAEnv(name, randomisation="varied", history=2)
+    single = PMAEnv(name, randomisation=how)
     expected, _ = single.reset(seed=40 + 17)
     np.testing.assert_array_equal(together[17], expected)
     for k in range(300):
@@ -280,10 +271,10 @@ def test_the_safety_layer_keeps_wild_commands_from_harm(name):
     for safety in (True, False):
         env = PMAEnv(name, safety=safety)
         ends[safety] = []
-        for seed in range(6):
+        for seed in range(4):
             adversarial(env, seed)
             ends[safety].append(env.ended_by)
-    assert ends[True] == [""] * 6
+    assert ends[True] == [""] * 4
     assert all("joint" in end for end in ends[False])
 
 
@@ -357,13 +348,6 @@ def test_refusals_say_what_can_be_had(task, options, message):
         PMAEnv(task, **options)
 
 
-def test_a_refused_moment_has_its_range():
-    with pytest.raises(UnreachableError) as refused:
-        PMAEnv("isotonic_exercise_12")
-    miss = refused.value.miss
-    assert miss.wanted == 12.0 and not miss.low <= 12.0 <= miss.high
-
-
 def test_pressures_of_an_episode_are_checked_too():
     env = PMAEnv("isotonic_exercise", pressure_kpa=550)
     with pytest.raises(UnreachableError, match="at 200 kPa, where no one moment can be held"):
@@ -394,10 +378,3 @@ def test_a_task_of_ones_own_takes_arrays():
     assert env.task.exercise.prescription.at(math.radians(45.0)) == pytest.approx(6.5)
     with pytest.raises(AttributeError, match="collect info"):
         _ = env.motor_voltages
-
-
-def test_an_id_makes_it():
-    env = gym.make("pma_gym/ResistiveExercise-v0", task="isotonic_exercise", pressure_kpa=550)
-    _, info = env.reset(seed=1)
-    assert info["moment_nm"] == pytest.approx(8.0, abs=1e-9)
-    assert isinstance(env.unwrapped.operator, Operator)

@@ -17,25 +17,16 @@ SEVERAL = {
 }  # fmt: skip
 """Nearly everything at once."""
 
-OPTIONS = [
-    {},
-    {"preview": 4, "history": 3},
-    {"regulator_action": True, "randomisation": "varied", "pressure_kpa": "random"},
-    {"noise": False, "action_delay_s": 0.02, "observation_delay_s": 0.03, "reward": "smooth"},
-    {"model": "cascade", "pressure_kpa": [300, 400.0]},
-    {"render_mode": "rgb_array"},
-    {"model": "station", "randomisation": "varied", "pressure_kpa": "random"},
-]
 MADE = {"model": "serres2008", "pressure_kpa": 300}
 DISPLACEMENT = "pma_gym/IsokineticDisplacement-v0"
 ISOTONIC = "pma_gym/IsotonicContraction-v0"
 EXERCISE = "pma_gym/ResistiveExercise-v0"
 
 
-@pytest.mark.parametrize("options", OPTIONS, ids=lambda options: ",".join(options) or "defaults")
-def test_check_env_finds_nothing_to_say(options):
+def test_check_env_finds_nothing_to_say_of_a_cascade():
     # pytest turns each warning into an error.
-    check_env(gym.make(DISPLACEMENT, **(MADE | options)).unwrapped)
+    made = {"model": "cascade", "pressure_kpa": [300, 400.0], "noise": False}
+    check_env(gym.make(DISPLACEMENT, **made).unwrapped)
 
 
 @pytest.mark.parametrize("name", ENVIRONMENTS)
@@ -49,25 +40,12 @@ def test_check_env_finds_nothing_to_say_of_nearly_everything_at_once(name):
 
 @pytest.mark.parametrize(
     ("name", "task"),
-    [
-        (ISOTONIC, "triangle_low"),
-        ("pma_gym/IsokineticRotation-v0", "rotation_multisine_3"),
-        (EXERCISE, "isotonic_exercise_6.5"),
-        (EXERCISE, "profile_exercise"),
-    ],
+    [("pma_gym/IsokineticRotation-v0", "rotation_multisine_3"), (EXERCISE, "profile_exercise")],
 )
 def test_check_env_finds_nothing_to_say_of_other_tasks_and_disturbances(name, task):
     env = gym.make(name, task=task, disturbances="regulator_and_hand_push").unwrapped
     assert env.task.name == task
     check_env(env)
-
-
-@pytest.mark.parametrize("prefix", ["", "pma_gym:"])
-@pytest.mark.parametrize("name", ENVIRONMENTS)
-def test_ids_make_their_task(name, prefix):
-    env = gym.make(prefix + name, **MADE)
-    assert isinstance(env.unwrapped, PMAEnv)
-    assert env.unwrapped.task.name == pma_gym.ENVIRONMENTS[name]
 
 
 def test_spec_survives_json():
@@ -88,9 +66,7 @@ def test_spec_survives_json():
     np.testing.assert_array_equal(first, second)
 
 
-@pytest.mark.parametrize(
-    "task", ["displacement_sine", "displacement_speeds_12", "isotonic", "isokinetic_exercise"]
-)
+@pytest.mark.parametrize("task", ["displacement_speeds_12", "isokinetic_exercise"])
 def test_names_of_tasks_survive_json(task):
     env = gym.make("pma_gym/IsokineticDisplacement-v0", task=task, pressure_kpa=300.0)
     assert env.spec is not None
@@ -99,39 +75,14 @@ def test_names_of_tasks_survive_json(task):
     np.testing.assert_array_equal(again.reset(seed=4)[0], env.reset(seed=4)[0])
 
 
-@pytest.mark.parametrize("kind", ["sync", "async"])
-def test_vectors_of_environments_run_past_the_ends_of_episodes(kind):
-    name = DISPLACEMENT
-    made = MADE | {"control_rate_hz": 10.0}
-    envs = gym.make_vec(name, 2, vectorization_mode=kind, **made)
-    observations, _ = envs.reset(seed=[1, 2])
-    single = gym.make(name, **made)
-    expected, _ = single.reset(seed=1)
-    np.testing.assert_array_equal(observations[0], expected)
-    ended = 0
-    for _ in range(110):
-        *_, truncated, infos = envs.step(envs.action_space.sample() * 0.0 - 0.8)
-        ended += int(truncated.sum())
-        if truncated.any():
-            assert np.all(infos["rmse_mm"] > 0.0)
-    assert ended == 4
-    envs.close()
-
-
-@pytest.mark.parametrize("name", ENVIRONMENTS)
-def test_the_default_is_the_identified_station(name):
-    env = gym.make(name)
-    check_env(env.unwrapped)
-    assert env.unwrapped.station.model.name == "station"
-
-
 @pytest.mark.parametrize("name", ENVIRONMENTS)
 def test_nothing_stands_between_an_agent_and_an_environment_that_checks_itself(name):
-    env = gym.make(name)
-    assert type(env) is PMAEnv
-    assert env.spec.id == name
+    env = gym.make(f"pma_gym:{name}")
+    assert type(env) is PMAEnv and env.task.name == pma_gym.ENVIRONMENTS[name]
+    assert env.spec.id == name and env.station.model.name == "station"
     with pytest.raises(gym.error.ResetNeeded, match=r"call reset\(\) before step\(\)"):
         env.step(env.action_space.sample())
+    check_env(env)
     checked = gym.make(name, disable_env_checker=False)
     checked.reset(seed=1)
     assert isinstance(checked, gym.wrappers.PassiveEnvChecker)

@@ -17,7 +17,7 @@ READ = (
 ).split()
 
 
-@pytest.mark.parametrize("task", ["displacement", "rotation", "isotonic", "isotonic_exercise"])
+@pytest.mark.parametrize("task", ["displacement", "isotonic_exercise"])
 def test_a_member_is_the_single_environment(task):
     options = MADE | {"randomisation": "varied", "disturbances": "regulator"}
     if "exercise" in task:
@@ -55,13 +55,13 @@ def test_a_member_is_the_single_environment(task):
 
 def test_pictures_go_on_through_the_ends_of_episodes(fragile):
     options = {"model": fragile, "pressure_kpa": 300, "control_rate_hz": 10.0}
-    envs = PMAVectorEnv(3, render_mode="rgb_array", max_episode_steps=20, **options)
+    envs = PMAVectorEnv(3, render_mode="rgb_array", max_episode_steps=10, **options)
     envs.reset(seed=1)
     first, ended = envs.render(), 0
-    for step in range(50):
+    for _ in range(24):
         *_, terminated, truncated, _ = envs.step(np.array([[1.0], [-0.9], [-0.9]], np.float32))
         ends = terminated | truncated
-        frames = envs.render() if ends.any() or step % 10 == 0 else ()
+        frames = envs.render() if ends.any() else ()
         if terminated[0]:
             ended += 1
             red = np.all(np.abs(frames[0].astype(int) - [198, 40, 40]) < 40, axis=2)
@@ -72,7 +72,7 @@ def test_pictures_go_on_through_the_ends_of_episodes(fragile):
             # The dot is where the trial begins, and nothing is left of the episode before.
             again = envs.render()
             assert np.abs(again[1][:, 430:].astype(int) - first[1][:, 430:]).mean() < 0.5
-    assert ended > 2
+    assert ended > 1
 
 
 def test_rendering_changes_no_bit():
@@ -134,19 +134,19 @@ def films(monkeypatch):
 def test_gymnasium_records_a_film_of_a_batch(films, tmp_path):
     if not hasattr(gym.wrappers.vector, "RecordVideo"):
         pytest.skip(f"Gymnasium {gym.__version__} has no RecordVideo of batches")
-    made = MADE | {"control_rate_hz": 10.0, "max_episode_steps": 11}
+    made = MADE | {"control_rate_hz": 10.0, "max_episode_steps": 3}
     envs = gym.make_vec("pma_gym/IsokineticDisplacement-v0", 4, **made)
     folder = str(tmp_path / "films")
     envs = gym.wrappers.vector.RecordVideo(
         envs, folder, episode_trigger=lambda episode: episode == 0
     )
     envs.reset(seed=1)
-    for _ in range(15):
+    for _ in range(5):
         envs.step(np.full((4, 1), -0.9, np.float32))
     envs.close()
     (film,) = films
-    # The episode's 11 steps and its first picture.
-    assert len(film.frames) == 12 and film.fps == 10
+    # The episode's 3 steps and its first picture.
+    assert len(film.frames) == 4 and film.fps == 10
     assert {frame.shape for frame in film.frames} == {(800, 1600, 3)}
 
 
@@ -157,12 +157,12 @@ def test_stable_baselines_records_a_film_of_a_batch(films, tmp_path):
     from pma_gym.sb3 import SB3VecEnv
 
     inner = VecNormalize(SB3VecEnv(4, control_rate_hz=10.0, **MADE))
-    envs = VecVideoRecorder(inner, str(tmp_path), lambda step: step == 0, video_length=6)
+    envs = VecVideoRecorder(inner, str(tmp_path), lambda step: step == 0, video_length=2)
     envs.reset()
-    for _ in range(8):
+    for _ in range(4):
         envs.step(np.full((4, 1), -0.5, np.float32))
     (film,) = films
-    assert film.fps == 10 and len(film.frames) == 7
+    assert film.fps == 10 and len(film.frames) == 3
     assert {frame.shape for frame in film.frames} == {(800, 1600, 3)}
     assert np.any(film.frames[0] != film.frames[-1])
     assert [one.shape for one in inner.venv.get_images()] == [(400, 800, 3)] * 4

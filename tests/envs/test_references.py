@@ -79,13 +79,12 @@ def _bow(time):
     return 4.4e-3 * time * (3.0 - time)
 
 
-@pytest.mark.parametrize("options", [{}, {"control_rate_hz": 37.0, "randomisation": "varied"}])
-def test_a_batch_has_the_bits_of_environments_alone(twins, options):
-    both = twins(17, multisine("extension", 5), **({"pressure_kpa": "random"} | options))
+def test_a_batch_has_the_bits_of_environments_alone(twins):
+    both = twins(17, multisine("extension", 5), pressure_kpa="random")
     both.reset(seed=3)
-    for _ in range(120 if options else 110):
+    for _ in range(110):
         both.step(-0.8, -0.3)
-    assert both.ends.sum() >= (0 if options else 17)
+    assert both.ends.sum() >= 17
 
 
 def test_references_of_one_structure_share_their_code(make, monkeypatch):
@@ -104,7 +103,7 @@ def test_references_of_one_structure_share_their_code(make, monkeypatch):
     assert built == []
 
 
-@pytest.mark.parametrize("name", UNSEEN)
+@pytest.mark.parametrize("name", ["displacement_steps", "rotation_sine"])
 def test_what_the_agent_sees_is_what_is_scored(make, name):
     env = make(name, preview=1, noise=False)
     observation, _ = env.reset(seed=0)

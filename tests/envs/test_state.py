@@ -12,16 +12,14 @@ from pma_gym.envs import EnvState, PMAEnv, PMAVectorEnv, StateError
 from pma_gym.plant.model import load_model
 from pma_gym.tasks import following
 
-FORMS = {
-    "value": lambda state: state,
-    "pickle": lambda state: pickle.loads(pickle.dumps(state)),
-    "json": lambda state: EnvState.from_json(state.to_json()),
-}
+
+def kept(state):
+    """A state through both forms in which it is kept."""
+    return pickle.loads(pickle.dumps(EnvState.from_json(state.to_json())))
 
 
-@pytest.mark.parametrize("form", FORMS)
-def test_an_environment_goes_on_from_its_state(form, options, single, course, same):
-    env, kept = single(options), FORMS[form]
+def test_an_environment_goes_on_from_its_state(options, single, course, same):
+    env = single(options)
     env.reset(seed=3)
     course(env, 9)
     state = kept(env.get_state())
@@ -103,13 +101,9 @@ def test_states_are_immutable_and_share_nothing(single, course):
     assert len({state, EnvState.from_json(text), env.get_state()}) == 2
 
 
-@pytest.mark.parametrize(
-    ("form", "randomisation"),
-    [("value", "none"), ("pickle", "varied"), ("json", "none")],
-)
-def test_a_batch_goes_on_from_its_state(form, batch_options, randomisation, batch_course, same):
-    made = batch_options | {"randomisation": randomisation}
-    envs, kept = PMAVectorEnv(17, **made), FORMS[form]
+def test_a_batch_goes_on_from_its_state(batch_options, batch_course, same):
+    made = batch_options | {"randomisation": "varied"}
+    envs = PMAVectorEnv(17, **made)
     # How many threads there are decides nothing.
     other = PMAVectorEnv(17, **(made | {"threads": 2}))
     waiting = kept(envs.get_state())
@@ -146,9 +140,8 @@ def test_own_stations_are_kept_with_their_names(course, same):
     assert same(course(other), course(env))
 
 
-@pytest.mark.parametrize("randomisation", ["none", "varied"])
-def test_a_batch_looks_ahead_from_where_one_environment_is(randomisation, course, same):
-    made = {"model": "station", "randomisation": randomisation, "control_rate_hz": 10.0}
+def test_a_batch_looks_ahead_from_where_one_environment_is(course, same):
+    made = {"model": "station", "randomisation": "varied", "control_rate_hz": 10.0}
     env = PMAEnv("displacement", **made)
     envs = PMAVectorEnv(6, "displacement", autoreset_mode="Disabled", threads=2, **made)
     env.reset(seed=1)
@@ -172,13 +165,8 @@ def as_given(nominal, generator):
 
 CHANGES = [
     ({"task": "rotation"}, r"task is displacement there and rotation here; make this one"),
-    ({"task": "displacement_sine"}, "task is displacement there and displacement_sine here"),
-    ({"control_rate_hz": 20.0}, r"control_rate_hz is 10\.0 there and 20\.0 here"),
-    ({"noise": False}, "noise is True there and False here"),
     ({"reward": "smooth", "preview": 2}, r"preview is 0\.0 there.*, reward is absolute there"),
-    ({"pressure_kpa": 350}, r"pressure_kpa is 300\.0 there and 350\.0 here"),
     ({"pressure_kpa": [300, 350]}, r"pressure_kpa is 300\.0 there and \[300\.0, 350\.0\] here"),
-    ({"randomisation": "varied"}, "randomisation is none there and varied here"),
     ({"randomisation": as_given}, "randomisation is none there and <function as_given> here"),
     ({"disturbances": "regulator"}, "disturbances is none there and regulator here"),
     ({"model": "station"}, r"model\..* there and .* here.* more; make this one"),
@@ -307,7 +295,7 @@ def test_states_with_any_bytes_changed_are_refused_or_run(kind, single):
         env.step(np.zeros(env.action_space.shape))
     text, generator = env.get_state().to_json(), np.random.default_rng(1)
     refused = 0
-    for _ in range(300):
+    for _ in range(120):
         document = json.loads(text)
         name = str(generator.choice(["numbers", "pressures", "observations", "rewards", "flags"]))
         data = bytearray(base64.b64decode(document["simulation"][name]))
@@ -322,28 +310,4 @@ def test_states_with_any_bytes_changed_are_refused_or_run(kind, single):
         for _ in range(2):
             if kind == "batch" or env._idle is None:
                 env.step(np.zeros(env.action_space.shape))
-    assert 0 < refused < 250
-
-
-def test_a_planner_finds_what_a_search_by_hand_finds(single):
-    """Depth-first over two actions: every leaf is what the plain sequence of actions gives."""
-    env = single({"randomisation": "varied", "noise": True})
-    env.reset(seed=6)
-    leaves = {}
-
-    def grow(path, total):
-        if len(path) == 5:
-            leaves[path] = total
-            return
-        state = env.get_state()
-        for action in (-0.5, 0.0):
-            reward = env.step([action])[1]
-            grow((*path, action), total + reward)
-            env.set_state(state)
-
-    grow((), 0.0)
-    assert len(leaves) == 32
-    for path, total in list(leaves.items())[::5]:
-        plain = single({"randomisation": "varied", "noise": True})
-        plain.reset(seed=6)
-        assert sum((plain.step([action])[1] for action in path), 0.0) == total
+    assert 0 < refused < 100

@@ -307,8 +307,7 @@ def test_a_matrix_that_lapack_gives_up_on_is_solved_all_the_same(monkeypatch):
     np.testing.assert_allclose(curvature @ step, -gradient, rtol=1e-9)
 
 
-@pytest.mark.parametrize("begun", [0.001, 0.003, 0.02, -0.05])
-@pytest.mark.parametrize("size", [1e3, 1.0, 1e-4])
+@pytest.mark.parametrize(("size", "begun"), [(1e3, 0.001), (1.0, 0.02), (1e-4, -0.05)])
 def test_an_effect_of_a_small_joint_is_fitted_as_that_of_a_large_one(size, begun):
     """A step of the range that the catalogue allows its damping would run away."""
     tables = {"joint_directional_damping": {"difference_n_m_s": 0.004 * size}}

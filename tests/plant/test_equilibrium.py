@@ -29,21 +29,6 @@ def test_nothing_moves_at_rest(model):
                 assert truth["load"][0] == pytest.approx(0.0, abs=1e-9)
 
 
-@pytest.mark.parametrize("model", ["serres2008", "station"])
-def test_at_rest_the_muscle_balances_the_load(model):
-    plant = Plant(model)
-    drive = plant.model.parameters["drive"]
-    for voltage in (1.0, 5.0):
-        rest = plant.settle(voltage, 400e3)
-        truth = plant.observe(rest.state[None, :], rest.zero_contraction)
-        load = drive.gain * voltage + drive.offset
-        assert truth["load"][0] == pytest.approx(load, rel=1e-9)
-        wound = plant.model.parameters["rotor"].radius * truth["rotation"][0]
-        cable = plant.model.parameters["cable"]
-        stretch = cable.slack + load / cable.stiffness
-        assert wound == pytest.approx(truth["extension"][0] + stretch, rel=1e-9)
-
-
 def test_serres2008_rests_where_its_three_elements_say():
     rest = Plant("serres2008").settle(3.0, 250e3)
     stiffness, load = 32.7 - 0.0321 * 250.0, 97.84 * 3.0 - 2.0

@@ -6,7 +6,6 @@ import pytest
 from pma_gym.data.trial import Trial, TrialError
 from pma_gym.envs import PMAEnv, PMAVectorEnv
 from pma_gym.estimation.fitting import fit
-from pma_gym.plant.equilibrium.solver import NoLoadEquilibria
 from pma_gym.plant.memory_start import begun_at, best_shares, memory_starts
 from pma_gym.plant.model import load_model
 from pma_gym.plant.plant import Plant
@@ -34,16 +33,6 @@ def test_at_rest_the_muscle_balances_what_its_memory_holds():
     # It has contracted less far: the force that it lacks, over its stiffness.
     short = Plant(AT_ZERO).settle(0.0, 300e3).zero_contraction - rest.zero_contraction
     assert short == pytest.approx(BEGUN * FORCE / (32.7 - 0.0321 * 300.0) * 1e-3, rel=1e-6)
-
-
-def test_many_at_rest_and_one_are_the_same():
-    plant, pressures = Plant(MODEL), np.array([200e3, 300e3, 500e3])
-    states, zeros = NoLoadEquilibria(plant)(pressures)
-    for pressure, state, zero in zip(pressures, states, zeros, strict=True):
-        rest = plant.settle(0.0, float(pressure))
-        # The pressure goes through the regulator's volts there: the last bit may differ.
-        assert state == pytest.approx(rest.state, rel=1e-14)
-        assert zero == pytest.approx(rest.zero_contraction, rel=1e-14)
 
 
 def test_a_pull_from_the_filled_branch_meets_twice_the_hysteresis():

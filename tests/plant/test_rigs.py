@@ -36,12 +36,17 @@ FIRST = {
 """A trial of every rig."""
 
 
-def package_files():
-    """All modules of the project."""
+@pytest.fixture(scope="module")
+def compared():
+    """What every module of the project compares with: its path, line, and the string."""
     packages = ("pma_gym", "controllers", "benchmarks")
     files = [path for package in packages for path in (ROOT / package).rglob("*.py")]
     assert len(files) > 500
-    return files
+    return [
+        (file.relative_to(ROOT), line, name)
+        for file in files
+        for name, line in compared_names(file)
+    ]
 
 
 def compared_names(path):
@@ -57,14 +62,12 @@ def compared_names(path):
                     yield part.value, node.lineno
 
 
-def test_nothing_compares_a_rigs_name():
+def test_nothing_compares_a_rigs_name(compared):
     """Beside the rigs' own folder, and that of the campaign that simulates rigs of its own."""
     there = [
-        f"{path.relative_to(ROOT)}:{line}"
-        for path in package_files()
-        if "rigs" not in path.relative_to(ROOT).parts
-        for name, line in compared_names(path)
-        if name in RIGS
+        f"{path}:{line}"
+        for path, line, name in compared
+        if "rigs" not in path.parts and name in RIGS
     ]
     assert there == []
 
@@ -83,17 +86,15 @@ def test_a_rig_says_what_its_equations_have(name):
     assert set(rig.refused_effects) <= set(CATALOGUE)
 
 
-def test_at_most_ten_comparisons_name_a_signal():
+def test_at_most_ten_comparisons_name_a_signal(compared):
     """All that is asked of a signal stands in its row: see `pma_gym.data.signals`."""
     names = (
         set(SIGNALS) | {s.column for s in SIGNALS.values()} | {s.sensor for s in SIGNALS.values()}
     )
     there = [
-        f"{path.relative_to(ROOT)}:{line}"
-        for path in package_files()
-        if path.name != "signals.py"
-        for name, line in compared_names(path)
-        if name in names - {""}
+        f"{path}:{line}"
+        for path, line, name in compared
+        if path.name != "signals.py" and name in names - {""}
     ]
     assert len(there) <= 10, there
 
@@ -103,12 +104,3 @@ def test_an_unknown_rig_is_refused_with_those_there_are():
     known = "station, cascade, slide, joint, imposed"
     with pytest.raises(ModelError, match=f"one of {known}, got 'lift'"):
         type(model)("m", "m", "lift", dict(model.parameters))
-
-
-def test_an_equilibrium_stands_still():
-    for name in ("station", "cascade"):
-        plant = Plant(name)
-        regulator = plant.regulator_voltage(300e3)
-        rest = plant.settle(1.0, regulator_voltage=regulator)
-        rates = plant.derivative(rest.state, 1.0, regulator, rest.zero_contraction)
-        assert np.all(np.abs(rates) < 1e-6 * np.maximum(1.0, np.abs(rest.state)))
