@@ -116,8 +116,3 @@ def test_a_contact_stays_rigid_where_no_rung_explains_more():
     value, error = best.estimate(share)
     assert abs(value - 8.0) < 2.0 * error
     assert abs(rung.estimate(share)[0] - 8.0) > 3.0 * error
-
-
-def test_what_is_scanned_is_held():
-    for effect in CATALOGUE.values():
-        assert set(effect.scanned) <= set(effect.held)
