@@ -6,6 +6,8 @@ Terms of one law: each is added by what it explains itself, and leaves where it 
 
 A seal rubs without pressure and more with it; a gear by the force of its drive, and perhaps by what
 it carries.
+
+Candidates that could not be fitted are listed; those whose score promised too much are not.
 """
 
 from dataclasses import replace
@@ -25,15 +27,21 @@ from pma_gym.discovery.preparation.noise import white_noise
 from pma_gym.discovery.preparation.prepared_trials import prepared
 from pma_gym.discovery.screening.candidates import candidate_effects
 from pma_gym.discovery.screening.probe_scores import Baseline
-from pma_gym.discovery.screening.score_test import ScreeningScore
+from pma_gym.discovery.screening.score_test import ScreeningScore, screen
 from pma_gym.discovery.selection import candidate_fits
-from pma_gym.discovery.selection.candidate_fits import carries_the_rest, without_idle
+from pma_gym.discovery.selection.candidate_fits import (
+    carries_the_rest,
+    stripped,
+    unfitted,
+    without_idle,
+)
 from pma_gym.discovery.selection.exchanged_effects import exchanged
 from pma_gym.discovery.selection.nested_laws import nested
 from pma_gym.discovery.selection.unscored_fits import unscored_fits
 from pma_gym.effects import CATALOGUE
 from pma_gym.effects.effect import Effect
 from pma_gym.plant.model import Model
+from tests.discovery.laboratory import STATION, fit_problem, laboratory
 from tests.discovery.test_imposed_motion import KNOWN, sizes_of, trials
 
 NOISE_RAD, SHARE_PERCENT, RATE_HZ = 1e-4, 30.0, 100.0
@@ -256,3 +264,31 @@ def test_friction_of_a_seal_has_both_parts_where_both_are_there_and_one_where_on
     assert named == set(there), diagnosis.sentence
     for path, size in there.items():
         assert sizes[path] == pytest.approx(size, rel=0.03)
+
+
+THERE, OTHER = "hysteresis", "load_cell_error"
+
+
+@pytest.fixture(scope="module")
+def scored():
+    problem = fit_problem(laboratory("hysteresis")[0])
+    before = problem.careful_fit(STATION)
+    assert before is not None
+    whitened = problem.whitened_residuals(before.model)
+    baseline = Baseline.at(whitened, before.values, before.steps)
+    candidates = [each for each in candidate_effects(STATION) if each.name in (THERE, OTHER)]
+    plain = stripped(problem, before)
+    scores = screen(baseline, candidates, 0, lambda each: problem.probed(plain, each))
+    return problem, baseline, before, {each.candidate.name: each for each in scores}
+
+
+def test_an_effect_that_is_there_and_has_no_fit_is_listed(scored):
+    problem, baseline, before, scores = scored
+    assert unfitted(problem, baseline, before, (), [scores[THERE]], {}) == (THERE,)
+
+
+def test_a_promise_that_no_refit_keeps_lists_nothing(scored):
+    """Parameters that follow along straight lines seem to leave a gain; a refit has none."""
+    problem, baseline, before, scores = scored
+    promised = replace(scores[OTHER], gain=2.0 * scores[THERE].gain)
+    assert unfitted(problem, baseline, before, (), [promised], {}) == ()
