@@ -88,19 +88,16 @@ def shipped(name):
 def arguments(effect, law, rows, seed=0):
     """Arrays of signals of a law, `None` where its parameters go."""
     generator = np.random.default_rng(seed)
-    return [
-        shipped("servo" if name == "servo" else effect.name)
-        if name in ("p", "servo")
-        else drawn(generator, effect, name, rows)
-        for name in signals(law)
-    ]
-
-
-def drawn(generator, effect, name, rows):
-    """Numbers of a signal; of a memory of several a tuple of them."""
-    if name == "memory" and effect.memories > 1:
-        return tuple(generator.uniform(*SIGNALS[name], rows) for _ in range(effect.memories))
-    return generator.uniform(*SIGNALS[name], rows)
+    given = []
+    for name in signals(law):
+        if name in ("p", "servo"):
+            given.append(shipped("servo" if name == "servo" else effect.name))
+        elif name == "memory" and effect.memories > 1:
+            rolls = [generator.uniform(*SIGNALS[name], rows) for _ in range(effect.memories)]
+            given.append(tuple(rolls))
+        else:
+            given.append(generator.uniform(*SIGNALS[name], rows))
+    return given
 
 
 def flat(outputs):
@@ -140,29 +137,21 @@ def traced(law, given):
 
 
 @pytest.mark.parametrize(("effect", "law"), LAWS)
-def test_one_text_gives_one_number(effect, law):
-    given = arguments(effect, law, 64)
-    plain = [flat(law(*one_row(given, row))) for row in range(64)]
-    parts = flat(as_numpy(law)(*given))
+def test_one_text_gives_one_number_finite_wherever_its_signals_go(effect, law):
+    given = arguments(effect, law, 200)
+    plain = np.array([flat(law(*one_row(given, row))) for row in range(200)], float)
+    assert np.isfinite(plain).all()
+    if law is effect.rate:
+        assert np.all(plain[:, 1::2] >= 0.0)
     # Compiled code has the bits of the graph: `tests/kernels`.
     for part, computed, expected in zip(
-        parts, traced(law, given), np.reshape(plain, (64, -1)).T, strict=True
+        flat(as_numpy(law)(*given)), traced(law, given), plain.T, strict=True
     ):
         scale = np.abs(expected).max()
         for value in (part, computed):
             np.testing.assert_allclose(
-                np.broadcast_to(value, 64), expected, rtol=1e-12, atol=1e-12 * scale
+                np.broadcast_to(value, 200), expected, rtol=1e-12, atol=1e-12 * scale
             )
-
-
-@pytest.mark.parametrize(("effect", "law"), LAWS)
-def test_a_law_is_finite_wherever_its_signals_go(effect, law):
-    given = arguments(effect, law, 200, seed=1)
-    for row in range(200):
-        out = flat(law(*one_row(given, row)))
-        assert all(math.isfinite(value) for value in out)
-        if law is effect.rate:
-            assert all(decay >= 0.0 for decay in out[1::2])
 
 
 @pytest.mark.parametrize(("effect", "law"), LAWS)
@@ -179,15 +168,26 @@ def test_every_quantity_has_unit_bounds_and_source(effect):
     assert effect.quantities.keys() == set(effect.parameters._fields)
     for name, quantity in effect.quantities.items():
         assert quantity.source
-        assert quantity.lower < quantity.upper
-        assert math.isfinite(quantity.lower) and math.isfinite(quantity.upper)
+        assert -math.inf < quantity.lower < quantity.upper < math.inf
         if quantity.neutral is not None:
             quantity.check(name, quantity.neutral)
-    file_keys = effect.names_in_files()
-    assert len(file_keys) == len(effect.parameters._fields)
+    assert len(effect.names_in_files()) == len(effect.parameters._fields)
     assert effect.parameters.__doc__
     ports = {"part", *(port for rig in RIGS.values() for port in rig.ports)}
     assert effect.port in ports or measured_output(effect.port)
+
+
+@pytest.mark.parametrize("effect", CATALOGUE.values(), ids=lambda effect: effect.name)
+def test_the_middle_of_the_bounds_and_usual_values_are_parameter_sets(effect):
+    assert set(effect.held) <= effect.quantities.keys()
+    assert set(effect.scanned) <= set(effect.held)
+    if effect.rows:
+        assert effect.name == "position_map"
+        return
+    assert all(quantity.usual is not None for quantity in effect.quantities.values())
+    for values in (effect.start, effect.usual):
+        assert effect.parse(effect.values_in_files(values)) == pytest.approx(values, rel=1e-12)
+    assert effect.usual != effect.neutral
 
 
 def test_names_are_unique_and_are_their_keys():
@@ -202,12 +202,9 @@ def test_names_are_unique_and_are_their_keys():
 
 
 def test_a_signature_sets_every_phenomenon_apart():
-    signatures = [
-        effect.signature
-        for effect in CATALOGUE.values()
-        if effect.port in PHENOMENA or (measured_output(effect.port) and effect.law)
-    ]
-    assert all(signatures)
+    for effect in CATALOGUE.values():
+        if effect.port in PHENOMENA or (measured_output(effect.port) and effect.law):
+            assert effect.signature, effect.name
 
 
 ADDED = [effect for effect in CATALOGUE.values() if effect.port in PHENOMENA]
@@ -231,14 +228,17 @@ def rates(model, states):
     return by_state
 
 
-def some_states(plant):
+@cache
+def some_states():
     """States about rest, by name, with commands."""
-    rest, generator = plant.settle(2.0, 300e3), np.random.default_rng(5)
+    plant, generator, made = Plant(BASE), np.random.default_rng(5), []
+    rest = plant.settle(2.0, 300e3)
     for _ in range(20):
         moved = rest.state * (1.0 + 0.1 * generator.standard_normal(rest.state.shape))
         moved += 1e-2 * generator.standard_normal(rest.state.shape)
         commands = {"motor": generator.uniform(0, 10), "regulator": generator.uniform(2, 9)}
-        yield dict(zip(plant.states, moved, strict=True)) | commands
+        made.append(dict(zip(plant.states, moved, strict=True)) | commands)
+    return made
 
 
 def trajectory(model):
@@ -269,8 +269,7 @@ def assert_near(computed, expected):
 def test_an_effect_at_its_neutral_value_is_exactly_absent(effect, without):
     less = Model("less", "", "station", {n: p for n, p in KEPT.items() if n != effect.name})
     more = Model("with", "", "station", {**less.parameters, effect.name: effect.neutral})
-    states = list(some_states(Plant(BASE)))
-    expected, slopes = rates(less, states), rates(more, states)
+    expected, slopes = (rates(each, some_states()) for each in (less, more))
     for name, values in expected.items():
         np.testing.assert_array_equal(slopes[name], values, err_msg=name)
     assert_near(trajectory(more), trajectory(less) if effect.name in KEPT else without)
@@ -278,9 +277,8 @@ def test_an_effect_at_its_neutral_value_is_exactly_absent(effect, without):
 
 def test_a_sensor_does_not_disturb_the_plant(without):
     bare = Model("bare", "", "station", {n: p for n, p in KEPT.items() if n not in SENSORS})
-    states = list(some_states(Plant(BASE)))
-    expected = rates(BASE, states)
-    for name, values in rates(bare, states).items():
+    expected = rates(BASE, some_states())
+    for name, values in rates(bare, some_states()).items():
         np.testing.assert_array_equal(values, expected[name])
     assert_near(trajectory(bare), without)
 
@@ -288,28 +286,6 @@ def test_a_sensor_does_not_disturb_the_plant(without):
 @given(st.floats(-12.0, 12.0))
 def test_the_laws_exponential_is_exact_to_1e_12(value):
     assert exponential(value) == pytest.approx(math.exp(value), rel=1e-12)
-
-
-@pytest.mark.parametrize("effect", CATALOGUE.values(), ids=lambda effect: effect.name)
-def test_the_middle_of_the_bounds_is_a_parameter_set(effect):
-    if effect.rows:
-        assert effect.name == "position_map"
-        return
-    assert effect.parse(effect.values_in_files(effect.start)) == pytest.approx(
-        effect.start, rel=1e-12
-    )
-
-
-@pytest.mark.parametrize("effect", CATALOGUE.values(), ids=lambda effect: effect.name)
-def test_usual_values_are_a_parameter_set_that_is_there(effect):
-    assert set(effect.held) <= effect.quantities.keys()
-    if effect.rows:
-        return
-    assert all(quantity.usual is not None for quantity in effect.quantities.values())
-    assert effect.parse(effect.values_in_files(effect.usual)) == pytest.approx(
-        effect.usual, rel=1e-12
-    )
-    assert effect.usual != effect.neutral
 
 
 def test_what_a_file_need_not_name_is_usual_or_absent_and_the_same_as_when_added():

@@ -1,4 +1,9 @@
-"""Errors of parameters: as the curvature says for noise, wider where a model is wrong; scatter."""
+"""Errors of parameters: as the curvature says for noise, wider where a model is wrong; scatter.
+
+Intervals count what a further effect beside the named ones would make of a parameter.
+
+Terms of one law have one size: friction that grows almost in proportion to the pressure.
+"""
 
 from functools import cache
 from types import SimpleNamespace
@@ -8,14 +13,21 @@ import pytest
 from scipy.signal import lfilter
 
 from pma_gym.data.trial import Trial
+from pma_gym.discovery.answer.estimates import _shifts_beside
 from pma_gym.discovery.fitting.covariance import LEAST_STRETCHES, clusters, covariance
-from pma_gym.discovery.fitting.fit_problem import _shown
+from pma_gym.discovery.fitting.fit_problem import FitProblem, Fitted, _shown
+from pma_gym.discovery.fitting.free_parameters import free_parameters
+from pma_gym.discovery.preparation.noise import white_noise
 from pma_gym.discovery.preparation.whitened_residuals import Pieces
 from pma_gym.discovery.screening.candidates import candidate_effects
+from pma_gym.discovery.selection.candidate_fits import LEAST_GAIN
 from pma_gym.discovery.verdict.homogeneity_test import homogeneity_test, newton_step
+from pma_gym.discovery.verdict.unknown import MOST_SPREAD
 from pma_gym.estimation.least_squares import inverse
+from pma_gym.plant import sensors
 from pma_gym.plant.plant import Plant
 from tests.discovery.laboratory import HYSTERESIS, STATION, commanded, fit_problem, measured
+from tests.plant.test_imposed import imposed
 
 LAW = next(each for each in candidate_effects(STATION) if each.name == "hysteresis")
 START = {"hysteresis": np.array([6.0, 1.0])}
@@ -174,3 +186,88 @@ def test_the_last_step_ends_where_a_bound_holds_a_parameter():
     joint = newton_step(gradient, curvature, np.array([True, True]))
     assert curvature @ joint + gradient == pytest.approx([0.0, 0.0])
     assert not newton_step(gradient, curvature, np.array([False, False])).any()
+
+
+MASS, DRAG, FRICTION = "slide.mass_kg", "drag.coefficient", "friction.force"
+
+
+def fit(chi_square, **values):
+    """A fit of a mass with effects of one parameter each."""
+    paths = {"mass": MASS, "drag": DRAG, "friction": FRICTION}
+    names = tuple(name for name in values if name != "mass")
+    model, steps = SimpleNamespace(), np.zeros(len(values))
+    at = tuple(paths[name] for name in values)
+    numbers = np.array(list(values.values()))
+    return Fitted(model, names, at, numbers, np.eye(len(at)), chi_square, steps, True)
+
+
+def diagnosed(*beside, named=("drag",)):
+    """A drag is named; fits of a friction beside it, in the last round."""
+    before = fit(1000.0, mass=5.0, drag=2.0)
+    last = SimpleNamespace(before=before, fits=dict(enumerate(beside)))
+    chosen = tuple(SimpleNamespace(name=name) for name in named)
+    return SimpleNamespace(
+        selection=SimpleNamespace(fit=fit(990.0, mass=5.1, drag=2.1), chosen=chosen, stages=[last])
+    )
+
+
+def test_a_friction_that_explains_more_moves_the_drag_and_the_mass():
+    more = fit(1000.0 - LEAST_GAIN, mass=4.8, drag=1.5, friction=0.3)
+    diagnosis = diagnosed(more)
+    assert _shifts_beside(diagnosis, diagnosis.selection.fit, DRAG) == pytest.approx([0.0, -0.5])
+    assert _shifts_beside(diagnosis, diagnosis.selection.fit, MASS) == pytest.approx([0.0, -0.2])
+
+
+def test_what_explains_hardly_more_moves_nothing():
+    less = fit(1001.0 - LEAST_GAIN, mass=4.8, drag=1.5, friction=0.3)
+    diagnosis = diagnosed(less)
+    assert _shifts_beside(diagnosis, diagnosis.selection.fit, DRAG) == [0.0]
+
+
+def test_a_round_beside_other_effects_says_nothing():
+    more = fit(0.0, mass=4.8, drag=1.5, friction=0.3)
+    for diagnosis in (diagnosed(more, named=("spring",)), diagnosed(more, named=())):
+        assert _shifts_beside(diagnosis, diagnosis.selection.fit, DRAG) == [0.0]
+    diagnosis = diagnosed(more)
+    assert _shifts_beside(diagnosis, fit(990.0, mass=5.1, drag=2.1), DRAG) == [0.0]
+
+
+KPA = (100.0, 300.0, 700.0)
+SENSOR = {"bandwidth_hz": 1000.0, "noise_n": 0.1}
+GIVEN = imposed(force_sensor=SENSOR)
+TIME = np.arange(0.0, 4.0, 0.02)
+
+
+def scatter_of_friction(friction, *names):
+    """Scatter of the size by trial, of effects fitted to friction (N) that differs by pressure."""
+    trials = []
+    for seed, (force, kpa) in enumerate(zip(friction, KPA, strict=True)):
+        hidden = {"contact_friction": {"force_n": force, "presliding_um": 100.0}}
+        commands = {
+            "contraction_command": 0.01 * (1.0 - np.cos(np.pi * TIME)),
+            "pressure_command": np.full(TIME.size, 1e3 * kpa),
+        }
+        rig = Plant(imposed(force_sensor=SENSOR, **hidden))
+        full = rig.simulate(Trial(TIME, commands), seed=seed)
+        trials.append(Trial(TIME, full.commands, {"force": full.measurements["force"]}))
+    problem = FitProblem(
+        trials, GIVEN, free_parameters(GIVEN), tuple(map(white_noise, sensors.deviations(GIVEN)))
+    )
+    known = {each.name: each for each in candidate_effects(GIVEN, None, trials)}
+    chosen = tuple(known[name] for name in names)
+    fit = problem.fit(GIVEN, chosen, {each.name: each.probes[0] for each in chosen})
+    assert fit is not None
+    return homogeneity_test(problem, fit, chosen, 0)["trial"]
+
+
+BOTH = ("contact_friction", "pressure_friction")
+
+
+def test_a_growth_that_saturates_is_a_small_error_of_the_friction():
+    assert scatter_of_friction((3.9, 5.4, 7.2), *BOTH) < 0.5 * MOST_SPREAD
+
+
+def test_a_law_that_misses_how_friction_changes_has_no_one_size():
+    falls_and_rises = scatter_of_friction((7.0, 3.0, 7.0), *BOTH)
+    assert falls_and_rises > 2.0 * MOST_SPREAD
+    assert scatter_of_friction((3.9, 5.4, 7.2), "contact_friction") == pytest.approx(0.25, abs=0.08)

@@ -56,18 +56,13 @@ def test_autoregression_recovers_what_made_the_noise(coefficients):
     assert noise_filter.level == pytest.approx(np.std(np.concatenate(parts)), rel=0.03)
 
 
-def test_white_noise_has_no_memory():
+def test_what_a_series_does_not_tell_stays_as_it_was():
+    """White noise has no memory, a level that is known is the least, few readings say nothing."""
     parts = [coloured((), 3.0, 2000, seed) for seed in range(3)]
     assert autoregression(parts, 0.0).coefficients == ()
-
-
-def test_a_level_that_is_known_is_kept_as_the_least():
     noise_filter = autoregression([coloured((0.6,), 1.0, 4000)], 5.0)
     assert noise_filter.level == 5.0
     assert noise_filter.innovation == pytest.approx(5.0 * np.sqrt(1 - 0.6**2), rel=0.05)
-
-
-def test_too_few_readings_say_nothing_but_the_level():
     assert autoregression([coloured((0.6,), 1.0, 50)], 2.0) == white_noise(2.0)
 
 
@@ -75,30 +70,22 @@ def test_too_few_readings_say_nothing_but_the_level():
 def test_whitened_noise_is_white_and_of_variance_one(coefficients):
     series = coloured(coefficients, 0.3, 8000, 5)
     level = float(np.std(coloured(coefficients, 0.3, 200000, 6)))
-    white = Whitening(coefficients, 0.3, level).white(series[None], NONE)[0]
-    assert np.mean(white**2) == pytest.approx(1.0, abs=4 * np.sqrt(2 / 8000))
-    for lag in range(1, 8):
-        assert abs(np.mean(white[:-lag] * white[lag:])) < 4 / np.sqrt(8000)
-
-
-def test_a_learnt_autoregression_whitens():
-    noise_filter = autoregression([coloured((0.8,), 0.3, 8000, 7)], 0.0)
-    white = noise_filter.white(coloured((0.8,), 0.3, 8000, 8)[None], NONE)[0]
-    assert np.mean(white**2) == pytest.approx(1.0, abs=0.08)
-    assert abs(np.mean(white[:-1] * white[1:])) < 4 / np.sqrt(8000) + 0.03
+    known = Whitening(coefficients, 0.3, level)
+    learnt = autoregression([coloured(coefficients, 0.3, 8000, 7)], 0.0)
+    for noise_filter, near in ((known, 0.0), (learnt, 0.03)):
+        white = noise_filter.white(series[None], NONE)[0]
+        assert np.mean(white**2) == pytest.approx(1.0, abs=4 * np.sqrt(2 / 8000) + near)
+        for lag in range(1, 8):
+            assert abs(np.mean(white[:-lag] * white[lag:])) < 4 / np.sqrt(8000) + near
 
 
 def test_whitening_is_linear_and_missing_readings_leave_no_trace():
-    noise = Whitening((0.9, -0.2), 0.5, 0.8)
+    noise, missing = Whitening((0.9, -0.2), 0.5, 0.8), np.array([0, 17, 18, 199])
     one, other = coloured((), 1.0, 200, 1), coloured((), 1.0, 200, 2)
-    missing = np.array([0, 17, 18, 199])
-    sums = noise.white((2 * one - other)[None], missing)
-    np.testing.assert_allclose(
-        sums, 2 * noise.white(one[None], missing) - noise.white(other[None], missing), atol=1e-12
-    )
-    touched = one.copy()
-    touched[missing] = 1e6
-    assert np.array_equal(noise.white(one[None], missing), noise.white(touched[None], missing))
+    first, second, sums = (noise.white(x[None], missing) for x in (one, other, 2 * one - other))
+    np.testing.assert_allclose(sums, 2 * first - second, atol=1e-12)
+    one[missing] = 1e6
+    assert np.array_equal(first, noise.white(one[None], missing))
 
 
 def test_a_reading_without_a_whole_past_counts_by_the_level():
@@ -112,31 +99,16 @@ def test_a_reading_without_a_whole_past_counts_by_the_level():
 
 
 def test_rest_is_where_commands_have_long_been_constant():
-    motor = np.ones(10 * 64)
+    motor, time = np.ones(10 * 64), np.arange(640) / 64
     motor[128:256] = 2.0 + np.arange(128) / 128
-    segments_at_rest = rest_segments(logged(motor))
-    time = np.arange(len(motor)) / 64
-    assert len(segments_at_rest) == 2
-    assert time[segments_at_rest[0].start] == pytest.approx(FIRST_REST_S, abs=2 / 64)
-    assert segments_at_rest[0].stop == 128
+    first, last = rest_segments(logged(motor))
+    assert time[first.start] == pytest.approx(FIRST_REST_S, abs=2 / 64)
+    assert (first.stop, last.stop) == (128, len(motor))
     # Index 256 is where the last value begins.
-    assert time[segments_at_rest[1].start] == pytest.approx(4.0 + REST_S, abs=2 / 64)
-    assert segments_at_rest[1].stop == len(motor)
-    for part in segments_at_rest:
-        assert np.ptp(motor[part]) == 0.0
-
-
-def test_what_always_moves_never_rests():
+    assert time[last.start] == pytest.approx(4.0 + REST_S, abs=2 / 64)
+    # What always moves never rests.
     assert rest_segments(logged(1.0 + np.arange(640) / 640)) == []
     assert level_at_rest([]) is None
-
-
-def test_noise_at_rest_is_the_sensors():
-    readings = measured(STATION, 4, rate=128.0)
-    trials = [Logged.of(STATION, i, trial) for i, trial in enumerate(readings)]
-    for channel in CHANNELS:
-        level = level_at_rest(rest_readings(trials, channel))
-        assert level == pytest.approx(LEVELS[channel], rel=0.2)
 
 
 def test_gaps_do_not_leak():
@@ -146,46 +118,39 @@ def test_gaps_do_not_leak():
     segments = rest_readings([trial], 0)
     assert level_at_rest(segments) == pytest.approx(1e-5, rel=0.15)
     assert rest_readings([trial], 2) == []
-    noise_filter = autoregression(segments, 0.0)
-    assert np.isfinite(
-        [noise_filter.level, noise_filter.innovation, *noise_filter.coefficients]
-    ).all()
-    assert np.isfinite(slow_part(segments, 64.0))
-    assert np.isfinite(noise_filter.white(trial.measured[0][None], trial.missing[0])).all()
+    each = autoregression(segments, 0.0)
+    numbers = [each.level, each.innovation, *each.coefficients, slow_part(segments, 64.0)]
+    white = each.white(trial.measured[0][None], trial.missing[0])
+    assert np.isfinite([*numbers, *white[0]]).all()
 
 
-@pytest.mark.parametrize(("step", "digits"), [(1.234e-5, 7), (3.217e-4, 6), (3.217e-4, 12)])
-def test_the_step_of_readings_is_found(step, digits):
-    generator = np.random.default_rng(2)
-    values = step * np.round(generator.normal(0.02, 20 * step, 640) / step)
+@pytest.mark.parametrize(
+    ("step", "digits"), [(1.234e-5, 7), (3.217e-4, 6), (3.217e-4, 12), (0.0, 12)]
+)
+def test_the_step_of_readings_is_found_and_continuous_ones_have_none(step, digits):
+    values = np.random.default_rng(2).normal(0.02, 20 * step or 1e-4, 640)
     # As a file with some digits has them.
-    values = np.round(values, digits)
-    step_seen = step_between([logged(np.ones(640), contraction=values)], 0)
-    assert step_seen == pytest.approx(step, rel=0.01)
-
-
-def test_continuous_readings_have_no_step():
-    values = np.random.default_rng(3).normal(0.02, 1e-4, 640)
+    values = np.round(step * np.round(values / step), digits) if step else values
     trial = logged(np.ones(640), contraction=values)
-    assert step_between([trial], 0) == 0.0
+    assert step_between([trial], 0) == pytest.approx(step, rel=0.01)
     assert step_between([trial], 3) == 0.0
 
 
-def test_the_daq_shows_its_step():
-    readings = measured(STATION, 2, rate=128.0)
+def test_noise_at_rest_is_the_sensors_and_the_daq_shows_its_step():
+    readings = measured(STATION, 4, rate=128.0)
     trials = [Logged.of(STATION, i, trial) for i, trial in enumerate(readings)]
     for channel, signal in enumerate(STATION.rig.signals):
+        level = level_at_rest(rest_readings(trials, channel))
+        assert level == pytest.approx(LEVELS[channel], rel=0.2)
         assert step_between(trials, channel) == pytest.approx(signal.resolution, rel=1e-3)
 
 
 def test_white_noise_has_no_slow_part_and_a_slow_sine_is_all_slow():
     white = [coloured((), 1.0, 4000, seed) for seed in range(4)]
+    slow = 2.0 * np.sin(2 * np.pi * 0.2 * np.arange(4000) / 128)
     assert slow_part(white, 128.0) < 4 / np.sqrt(16000)
-    time = np.arange(4000) / 128
-    slow = [2.0 * np.sin(2 * np.pi * 0.2 * time)]
-    assert slow_part(slow, 128.0) == pytest.approx(2.0, rel=0.03)
-    both = [2.0 * np.sin(2 * np.pi * 0.2 * time) + part for part in white]
-    assert slow_part(both, 128.0) == pytest.approx(2.0, rel=0.06)
+    assert slow_part([slow], 128.0) == pytest.approx(2.0, rel=0.03)
+    assert slow_part([slow + part for part in white], 128.0) == pytest.approx(2.0, rel=0.06)
     assert slow_part([], 128.0) == 0.0
 
 
@@ -202,22 +167,18 @@ def test_a_signal_read_a_few_times_a_trial_is_no_series():
 
 def test_noise_of_a_few_readings_comes_from_repeats():
     """No segment rests long enough; the model's sensor says far less than repeats scatter."""
-    rng = np.random.default_rng(4)
-    named = []
+    rng, named = np.random.default_rng(4), []
+    time, read = np.array([0.0, 5.0, 10.0, 15.0]), np.array([30e-3, np.nan, 20e-3, 29e-3])
+    commands = {"motor_voltage": np.zeros(4), "regulator_voltage": np.full(4, 5.0)}
     for load in range(60):
         for repeat in range(3):
-            read = np.array([30e-3, np.nan, 20e-3, 29e-3]) + rng.normal(0.0, 0.6e-3, 4)
-            trial = Trial(
-                np.array([0.0, 5.0, 10.0, 15.0]),
-                {"motor_voltage": np.zeros(4), "regulator_voltage": np.full(4, 5.0)},
-                {"contraction": read},
-            )
-            first = None if repeat == 0 else f"{load} 0"
+            trial = Trial(time, commands, {"contraction": read + rng.normal(0.0, 0.6e-3, 4)})
+            first = f"{load} 0" if repeat else None
             named.append(NamedTrial(f"{load} {repeat}", trial, float(repeat), first))
-    read = [Logged.of(STATION, i, each.trial) for i, each in enumerate(named)]
-    level = initial_floors(STATION, read, named)[0]
-    assert level.source == "repeats"
-    assert level.level == pytest.approx(0.6e-3, rel=0.1)
+    level, *_ = initial_floors(
+        STATION, [Logged.of(STATION, i, each.trial) for i, each in enumerate(named)], named
+    )
+    assert level.source == "repeats" and level.level == pytest.approx(0.6e-3, rel=0.1)
 
 
 @pytest.mark.parametrize(("level", "coarse"), [(0.3e3, True), (2.3e3, False)])
@@ -257,15 +218,13 @@ def test_a_labs_own_encoder_tells_its_step_and_its_noise(step, amplitude, digits
 
 
 def test_what_a_lab_states_of_its_sensor_counts_before_all_else():
-    logged_ = [Logged.of(STATION, i, each) for i, each in enumerate(measured(STATION, 2))]
     named = [NamedTrial(f"{i}", each) for i, each in enumerate(measured(STATION, 2))]
+    trials = [Logged.of(STATION, i, each.trial) for i, each in enumerate(named)]
     stated = {"contraction": LabSensor(resolution=1e-5, noise=2e-4)}
-    floor = initial_floors(STATION, logged_, named, stated)[0]
-    assert (floor.level, floor.source) == (2e-4, "the lab's sensor")
+    floor = initial_floors(STATION, trials, named, stated)[0]
     # The DAQ's step is five times what the lab states.
-    assert floor.expected_step == 1e-5
-    assert not is_coarse(floor)
-    assert is_coarse(replace(floor, level=2e-5))
+    assert (floor.level, floor.source, floor.expected_step) == (2e-4, "the lab's sensor", 1e-5)
+    assert [is_coarse(replace(floor, level=level)) for level in (2e-4, 2e-5)] == [False, True]
 
 
 def test_a_segment_in_which_the_rig_swings_on_is_no_rest():

@@ -1,6 +1,7 @@
 """Noise as laboratories have it is learnt from repeats and rest, and projected out of every fit."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -21,16 +22,26 @@ CHANNEL = 3
 
 def _logged(noises: list[np.ndarray]) -> tuple[list[Logged], list[NamedTrial]]:
     """Repeats of one trial with pressure (Pa) alone, each with its noise."""
-    model = load_model("serres2008")
-    named = []
+    model, named = load_model("serres2008"), []
     for number, noise in enumerate(noises):
-        time = np.arange(len(noise)) / RATE
-        regulator = 5.0 + np.sin(2.0 * np.pi * 0.5 * time)
-        commands = {"motor_voltage": np.ones(len(time)), "regulator_voltage": regulator}
-        pressure = 3e5 + 2e4 * np.sin(2.0 * np.pi * 0.5 * time - 0.4) + LEVEL * noise
-        trial = Trial(time, commands, {"pressure": pressure})
+        wave = 2.0 * np.pi * 0.5 * np.arange(len(noise)) / RATE
+        commands = {"motor_voltage": np.ones(len(wave)), "regulator_voltage": 5.0 + np.sin(wave)}
+        pressure = 3e5 + 2e4 * np.sin(wave - 0.4) + LEVEL * noise
+        trial = Trial(np.arange(len(noise)) / RATE, commands, {"pressure": pressure})
         named.append(NamedTrial(f"{number}", trial, repeat_of="0" if number else None))
     return [Logged.of(model, i, each.trial) for i, each in enumerate(named)], named
+
+
+def _learnt(noises: list[np.ndarray]) -> Whitening:
+    """What repeats with such noise tell of the pressure's."""
+    return learnt_noise(_levels(), *_logged(noises))[CHANNEL]
+
+
+def _rms_left(noise: Whitening, trial: Logged, rows: np.ndarray, free_zero: bool = False) -> Any:
+    """What a projection leaves of rows, root mean square."""
+    left = np.atleast_2d(rows).copy()
+    projection(noise, trial, CHANNEL, free_zero).out_of(left)
+    return np.sqrt(np.mean(left**2, axis=1))
 
 
 def _levels() -> list[Whitening]:
@@ -47,32 +58,25 @@ def _coloured(rng: np.random.Generator, memory: float, rows: int) -> np.ndarray:
 def test_repeats_tell_the_colour_of_the_noise() -> None:
     """An AR(1) of 0.8 is learnt from what two repeats differ by; white noise stays white."""
     rng = np.random.default_rng(1)
-    logged, named = _logged([_coloured(rng, 0.8, 1024) for _ in range(2)])
-    learnt = learnt_noise(_levels(), logged, named)[CHANNEL]
+    learnt = _learnt([_coloured(rng, 0.8, 1024) for _ in range(2)])
     assert learnt.coefficients[0] == pytest.approx(0.8, abs=0.08)
     assert learnt.drift == 0.0
-    logged, named = _logged([rng.standard_normal(1024) for _ in range(2)])
-    assert learnt_noise(_levels(), logged, named)[CHANNEL].coefficients == ()
+    assert _learnt([rng.standard_normal(1024) for _ in range(2)]).coefficients == ()
 
 
 def test_a_drift_is_learnt_from_repeats_and_one_that_repeats_is_structure() -> None:
     """Slow cosines that differ between repeats are a drift; the same in all of them are none."""
-    rng = np.random.default_rng(2)
-    slow = np.cos(np.pi * np.arange(1024) / 1024)
-    logged, named = _logged([rng.standard_normal(1024) + s * slow for s in (1.0, -0.8)])
-    assert learnt_noise(_levels(), logged, named)[CHANNEL].drift > 0.3 * LEVEL
-    logged, named = _logged([rng.standard_normal(1024) + slow for _ in range(2)])
-    assert learnt_noise(_levels(), logged, named)[CHANNEL].drift == 0.0
+    rng, slow = np.random.default_rng(2), np.cos(np.pi * np.arange(1024) / 1024)
+    for signs, least, most in (((1.0, -0.8), 0.3 * LEVEL, np.inf), ((1.0, 1.0), 0.0, 0.0)):
+        drift = _learnt([rng.standard_normal(1024) + sign * slow for sign in signs]).drift
+        assert least <= drift <= most
 
 
 @pytest.mark.parametrize("memory", [0.0, 0.8, 0.95])
 def test_the_size_of_a_drift_does_not_depend_on_the_colour_of_the_noise(memory: float) -> None:
     """Coloured noise has many times as much at a drift's frequencies as white noise of its size."""
-    rng, at = np.random.default_rng(11), np.arange(4096) / 4096
-    signs = (1.0, -1.0) * 4
-    noises = [_coloured(rng, memory, 4096) + sign * np.cos(np.pi * at) for sign in signs]
-    logged, named = _logged(noises)
-    learnt = learnt_noise(_levels(), logged, named)[CHANNEL]
+    rng, slow = np.random.default_rng(11), np.cos(np.pi * np.arange(4096) / 4096)
+    learnt = _learnt([_coloured(rng, memory, 4096) + sign * slow for sign in (1.0, -1.0) * 4])
     # Two that drift against each other differ by twice what each of them does: by root 2 more than
     # two that drift at random.
     assert learnt.drift / UNSURE == pytest.approx(LEVEL, rel=0.15)
@@ -80,13 +84,11 @@ def test_the_size_of_a_drift_does_not_depend_on_the_colour_of_the_noise(memory: 
 
 def test_repeats_with_holes_tell_the_noise_too() -> None:
     """Readings that were set aside, as outliers are, hide neither colour nor drift of the rest."""
-    rng = np.random.default_rng(4)
-    slow = np.cos(np.pi * np.arange(1024) / 1024)
+    rng, slow = np.random.default_rng(4), np.cos(np.pi * np.arange(1024) / 1024)
     noises = [_coloured(rng, 0.8, 1024) + sign * slow for sign in (2.0, -2.0)]
     for noise in noises:
         noise[rng.choice(1024, 20, replace=False)] = np.nan
-    logged, named = _logged(noises)
-    learnt = learnt_noise(_levels(), logged, named)[CHANNEL]
+    learnt = _learnt(noises)
     assert learnt.coefficients[0] == pytest.approx(0.8, abs=0.1)
     assert learnt.drift > LEVEL
 
@@ -94,48 +96,39 @@ def test_repeats_with_holes_tell_the_noise_too() -> None:
 def test_rows_of_commands_alone_hide_no_drift() -> None:
     """Averaged logs keep rows without readings where commands bend; they are no holes."""
     rng, at = np.random.default_rng(7), np.arange(2048)
-    slow = np.cos(np.pi * at / 2048)
-    alone = (at > 500) & (at % 2 == 1)
-    noises = [rng.standard_normal(2048) + sign * slow for sign in (1.0, -0.8)]
+    noises = [rng.standard_normal(2048) + sign * np.cos(np.pi * at / 2048) for sign in (1.0, -0.8)]
     for noise in noises:
-        noise[alone] = np.nan
-    logged, named = _logged(noises)
-    assert np.mean(logged[0].counts[CHANNEL] > 0.0) < 0.7
-    learnt = learnt_noise(_levels(), logged, named)[CHANNEL]
-    assert learnt.drift > 0.3 * LEVEL
-    assert learnt.coefficients == ()
+        noise[(at > 500) & (at % 2 == 1)] = np.nan
+    learnt = _learnt(noises)
+    assert np.mean(_logged(noises)[0][0].counts[CHANNEL] > 0.0) < 0.7
+    assert learnt.drift > 0.3 * LEVEL and learnt.coefficients == ()
 
 
 def test_repeated_pieces_of_runs_tell_a_drift_by_their_constants() -> None:
     """A wave of 32 s is a constant in each piece of a second; between whole trials it is a zero."""
-    rng, at = np.random.default_rng(8), np.arange(2 * 16 * 128) / (16 * 128)
-    noises = [
-        rng.standard_normal(128) + np.sqrt(2.0) * np.sin(np.pi * at[start : start + 128] + phase)
+    rng, at = np.random.default_rng(8), np.pi * np.arange(2 * 16 * 128) / (16 * 128)
+    waves = [
+        np.sqrt(2.0) * np.sin(at[start : start + 128] + phase)
         for start in range(0, 16 * 128, 128)
         for phase in (0.4, 3.0)
     ]
-    logged, named = _logged(noises)
-    runs = [
-        replace(each, file=f"run{i % 2}", repeat_of=f"{i - i % 2}") for i, each in enumerate(named)
-    ]
-    learnt = learnt_noise(_levels(), logged, runs)[CHANNEL]
+    learnt, whole, none = (
+        learnt_noise(_levels(), logged, runs)[CHANNEL]
+        for share, files in ((1.0, True), (1.0, False), (0.0, True))
+        for logged, named in [_logged([rng.standard_normal(128) + share * w for w in waves])]
+        for runs in [
+            [
+                replace(e, file=f"run{i % 2}" if files else None, repeat_of=f"{i - i % 2}")
+                for i, e in enumerate(named)
+            ]
+        ]
+    )
     assert 0.8 * LEVEL < learnt.offset / UNSURE < 1.5 * LEVEL
-    whole = [replace(each, file=None) for each in runs]
-    assert learnt_noise(_levels(), logged, whole)[CHANNEL].offset == 0.0
+    assert whole.offset == none.offset == 0.0
     # A constant of its own in every piece loses its weight, and a course keeps it.
-    made = projection(learnt, logged[0], CHANNEL, free_zero=False)
-    left = np.stack([np.ones(128), np.sin(2.0 * np.pi * np.arange(128) / 128)])
-    made.out_of(left)
-    assert np.sqrt(np.mean(left**2, axis=1)) == pytest.approx([0.05, np.sqrt(0.5)], abs=0.03)
-
-
-def test_repeated_pieces_without_a_drift_have_no_constants_of_their_own() -> None:
-    rng = np.random.default_rng(9)
-    logged, named = _logged([rng.standard_normal(128) for _ in range(32)])
-    runs = [
-        replace(each, file=f"run{i % 2}", repeat_of=f"{i - i % 2}") for i, each in enumerate(named)
-    ]
-    assert learnt_noise(_levels(), logged, runs)[CHANNEL].offset == 0.0
+    rows = np.stack([np.ones(128), np.sin(2.0 * np.pi * np.arange(128) / 128)])
+    left = _rms_left(learnt, _logged([waves[0]])[0][0], rows)
+    assert left == pytest.approx([0.05, np.sqrt(0.5)], abs=0.03)
 
 
 @pytest.mark.parametrize("turns", [0.5, 0.8, 1.1, 1.5])
@@ -157,25 +150,17 @@ def test_a_drift_has_as_many_half_waves_as_repeats_tell(turns: float) -> None:
     """What it leaves of a wave of other phases in each repeat is less than a third of the noise."""
     rng, at = np.random.default_rng(5), np.arange(1024) / 1024
     waves = [2.0 * np.sin(2.0 * np.pi * turns * at + phase) for phase in (0.4, 3.0)]
-    logged, named = _logged([rng.standard_normal(1024) + wave for wave in waves])
-    learnt = learnt_noise(_levels(), logged, named)[CHANNEL]
-    made = projection(learnt, logged[0], CHANNEL, free_zero=False)
-    left = waves[0][None].copy()
-    made.out_of(left)
-    assert np.sqrt(np.mean(left**2)) < 0.33
+    noises = [rng.standard_normal(1024) + wave for wave in waves]
+    assert _rms_left(_learnt(noises), _logged(noises)[0][0], waves[0]) < 0.33
 
 
 @pytest.mark.parametrize("phase", [0.4, 1.5, 3.0])
 def test_a_drift_of_one_period_is_none_of_the_rigs_where_commands_are_as_slow(phase: float) -> None:
     """What it leaves of a wave twice the noise is less than a third of the noise."""
-    at = np.arange(1024) / 1024
-    logged, _ = _logged([np.zeros(1024)])
-    slow = replace(logged[0], motor=np.sin(2.0 * np.pi * at), regulator=np.zeros(1024))
-    noise = replace(white_noise(LEVEL), drift=3.0 * LEVEL)
-    wave = np.sin(2.0 * np.pi * at + phase)
-    left = 2.0 * wave[None] / np.std(wave)
-    projection(noise, slow, CHANNEL, free_zero=True).out_of(left)
-    assert np.sqrt(np.mean(left**2)) < 0.33
+    turn, (logged, *_) = 2.0 * np.pi * np.arange(1024) / 1024, _logged([np.zeros(1024)])[0]
+    slow = replace(logged, motor=np.sin(turn), regulator=np.zeros(1024))
+    noise, wave = replace(white_noise(LEVEL), drift=3.0 * LEVEL), np.sin(turn + phase)
+    assert _rms_left(noise, slow, 2.0 * wave / np.std(wave), free_zero=True) < 0.33
 
 
 def _humming(hertz: list[float], seconds: float) -> tuple[list[Logged], list[np.ndarray]]:
@@ -229,29 +214,23 @@ def test_a_small_harmonic_counts_beside_a_line_of_the_same_mains() -> None:
     """Of 8 % of the noise it adds up over a long trial; alone it is none."""
     logged, left = _humming([50.0, 50.01] * 2, 70.0)
     small = 0.08 * np.sqrt(2.0) * LEVEL * np.sin(2.0 * np.pi * 150.0 * logged[0].time)
-    assert with_lines(_levels(), logged, left)[CHANNEL].lines == pytest.approx((50.0,), abs=0.02)
-    beside = [part + small for part in left]
-    lines = with_lines(_levels(), logged, beside)[CHANNEL].lines
-    assert lines == pytest.approx((50.0, 150.0), abs=0.05)
     rng = np.random.default_rng(8)
-    alone = [
-        np.where(np.isnan(part), part, LEVEL * rng.standard_normal(part.shape)) for part in left
-    ]
-    assert not with_lines(_levels(), logged, [part + small for part in alone])[CHANNEL].lines
+    alone = [part * np.nan for part in left]
+    for part in alone:
+        part[CHANNEL] = LEVEL * rng.standard_normal(part.shape[1]) + small
+    for rows, lines in ((left, [50.0]), ([p + small for p in left], [50.0, 150.0]), (alone, [])):
+        found = with_lines(_levels(), logged, rows)[CHANNEL].lines
+        assert list(found) == pytest.approx(lines, abs=0.05)
 
 
-@pytest.mark.parametrize("phase", [0.0, 0.9])
-def test_pieces_of_a_large_slow_misfit_have_no_lines(phase: float) -> None:
+def test_pieces_of_a_large_slow_misfit_have_no_lines() -> None:
     """A piece of a second ends otherwise than it begins, which has a part at every frequency."""
     rng, time = np.random.default_rng(4), np.arange(128) / RATE
-    logged, _ = _logged([np.zeros(128)] * 200)
-    left = []
-    for number in range(200):
-        part = np.full((4, 128), np.nan)
-        slow = 60.0 * np.sin(2 * np.pi * 0.4 * (time + number) + phase)
+    logged, left = _logged([np.zeros(128)] * 200)[0], np.full((200, 4, 128), np.nan)
+    for number, part in enumerate(left):
+        slow = 60.0 * np.sin(2 * np.pi * 0.4 * (time + number) + 0.9)
         part[CHANNEL] = LEVEL * (rng.standard_normal(128) + slow)
-        left.append(part)
-    assert with_lines(_levels(), logged, left)[CHANNEL] == _levels()[CHANNEL]
+    assert with_lines(_levels(), logged, list(left))[CHANNEL] == _levels()[CHANNEL]
 
 
 def test_a_projection_makes_noise_with_a_drift_white() -> None:

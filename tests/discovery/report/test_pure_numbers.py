@@ -1,4 +1,7 @@
-"""A pure number has no unit in any message or table: 'hold it to 0.3', not '0.3 1'."""
+"""A pure number has no unit in any message or table: 'hold it to 0.3', not '0.3 1'.
+
+Effects in a sentence: which of them may be another one is clear.
+"""
 
 import re
 from dataclasses import replace
@@ -9,6 +12,7 @@ import pytest
 
 from pma_gym.discovery.fitting.free_parameters import FreeParameters, unit
 from pma_gym.discovery.report.figure_text import estimate_text
+from pma_gym.discovery.report.size_text import effect_sizes, sized_effects
 from pma_gym.discovery.report.summary import print_fit
 from pma_gym.discovery.report.tables import effect_table, moved_table
 from pma_gym.discovery.report.verdict_text import sentence, unidentified
@@ -57,3 +61,25 @@ def test_tables_leave_the_unit_of_a_pure_number_blank(example, capsys):
     pure, force = (next(line for line in lines if path in line) for path in moved)
     assert re.search(r"1\.05 to 1\.45 │ +│ differs", pure)
     assert re.search(r"1\.05 to 1\.45 │ N +│", force)
+
+
+SIZE = {"force_n": Estimate(3.66, 3.5, 3.8, "N")}
+FRICTION = NamedEffect("contact_friction", ("quadratic_drag",), 0.001, SIZE)
+SPRING = NamedEffect("linear_spring", (), 0.001, SIZE)
+
+
+def test_a_rival_ends_before_the_next_effect():
+    text = "contact friction (force 3.66 N), or quadratic drag, and linear spring (force 3.66 N)"
+    assert sized_effects([FRICTION, SPRING]) == text
+
+
+def test_effects_without_a_rival_stand_side_by_side():
+    text = "linear spring (force 3.66 N) and contact friction (force 3.66 N), or quadratic drag"
+    assert sized_effects([SPRING, FRICTION]) == text
+    assert sized_effects([]) == ""
+
+
+def test_stribeck_is_a_name():
+    speed = {"stribeck_speed_mm_per_s": Estimate(3.0, 2.5, 3.9, "mm/s")}
+    friction = NamedEffect("coulomb_friction", (), 0.001, speed)
+    assert effect_sizes(friction) == "Stribeck speed 3 mm/s"

@@ -1,3 +1,8 @@
+"""
+
+Regions and maps speak of the conditions that a rig has, in its units.
+"""
+
 import time
 
 import numpy as np
@@ -7,9 +12,11 @@ from pma_gym.data.trial import Trial
 from pma_gym.discovery.fitting.fit_problem import Fitted
 from pma_gym.discovery.preparation.noise import white_noise
 from pma_gym.discovery.preparation.whitened_residuals import WhitenedResiduals
+from pma_gym.discovery.screening.condition_axes import condition_axes
 from pma_gym.discovery.screening.localisation import adjusted, localise
 from pma_gym.plant.model import load_model
 from pma_gym.plant.plant import Plant
+from pma_gym.plant.rigs import RIGS
 
 FREE = ("drive.gain_n_per_v",)
 LEVELS = np.array([0.05e-3, 5e-3, 2.0, 1e3])
@@ -142,3 +149,18 @@ def test_many_trials_take_seconds():
     begun = time.process_time()
     localised(made)
     assert time.process_time() - begun < 20.0
+
+
+SPOKEN = {
+    "station": ("pressure kPa, load N, contraction mm", "mm/s", "shortening"),
+    "slide": ("contraction mm", "mm/s", "shortening"),
+    "joint": ("angle deg", "deg/s", "turning forwards"),
+}
+
+
+@pytest.mark.parametrize("name", SPOKEN)
+def test_conditions_have_the_words_of_the_rigs_signals(name):
+    levels, unit, forwards = SPOKEN[name]
+    axes = condition_axes(RIGS[name].signals)
+    assert ", ".join(f"{axis.words} {axis.unit}" for axis in axes.levels) == levels
+    assert (axes.speed.unit, axes.forwards) == (unit, forwards)

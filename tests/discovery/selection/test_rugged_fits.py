@@ -1,20 +1,32 @@
-"""Fits that bear a rugged chi-square: dry friction with a static level that a slide sticks by."""
+"""Fits that bear a rugged chi-square: dry friction with a static level that a slide sticks by.
 
+Two effects of a free rig that is far from its model: found in short pieces of its trials.
+"""
+
+import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from benchmarks.hidden_effects.rigs import laws
+from benchmarks.hidden_effects.rigs.rig import Rig
+from benchmarks.hidden_effects.rigs.simulators import stick_slip
+from benchmarks.hidden_effects.rigs.simulators.drive import Transmission
 from pma_gym.data.datasets.dataset import NamedTrial
+from pma_gym.data.trial import Trial
 from pma_gym.discovery.fitting import derivative_free
 from pma_gym.discovery.fitting.derivative_free import refined
+from pma_gym.discovery.fitting.fewer_pieces import PIECES, with_fewer_pieces
 from pma_gym.discovery.fitting.fit_problem import FitProblem
 from pma_gym.discovery.fitting.free_parameters import free_parameters
+from pma_gym.discovery.fitting.journal import Journal
 from pma_gym.discovery.fitting.short_pieces import in_short_pieces
 from pma_gym.discovery.preparation.noise import white_noise
 from pma_gym.discovery.preparation.prepared_trials import prepared
 from pma_gym.discovery.screening.candidates import candidate_effects
 from pma_gym.discovery.selection import rugged_fits
+from pma_gym.discovery.selection.candidate_fits import refit
 from pma_gym.discovery.selection.rugged_fits import (
     FIRST,
     STARTS,
@@ -22,7 +34,9 @@ from pma_gym.discovery.selection.rugged_fits import (
     is_rugged,
     settled,
 )
-from pma_gym.plant.model import load_model
+from pma_gym.discovery.workflow import diagnose
+from pma_gym.effects import CATALOGUE
+from pma_gym.plant.model import Model, load_model
 from tests.discovery.rig_trials import FROZEN, driven_slide
 
 MODEL = load_model(FROZEN / "driven_slide" / "model.toml")
@@ -161,3 +175,77 @@ def test_a_piece_has_what_belongs_to_its_whole_trial():
 )
 def test_fits_are_equal_where_their_difference_is_chance(differences, chance):
     assert rugged_fits._is_by_chance(np.array(differences)) is chance
+
+
+RATE, SECONDS, STEP = 100.0, 4.0, 2e-6
+AXIS = Rig("slide", 3.0, 20.0, 0.0, 0.0, 0.0, 0.015, 1.5, RATE)
+HIDDEN = (laws.CoulombFriction(8.0), laws.DirectionalDamping(12.0))
+
+
+def given():
+    tables = {
+        "two_way_drive": {"gain_n_per_v": 100.0, "middle_v": 5.0},
+        "slide": {"mass_kg": 3.0},
+        "symmetric_damping": {"intercept_n_s_per_mm": 0.02, "slope_n_s_per_mm_per_kpa": 0.0},
+        "start": {"contraction_mm": 0.0, "velocity_mm_per_s": 0.0},
+        "lvdt": {"bandwidth_hz": 1000.0, "noise_mm": 1e3 * STEP},
+    }
+    return Model("axis", "An axis", "slide", {n: CATALOGUE[n].parse(t) for n, t in tables.items()})
+
+
+def controlled(seed):
+    """A trial of the axis in a loop; a force of the simulator contracts."""
+    rng = np.random.default_rng(seed)
+    time = np.arange(round(SECONDS * RATE)) / RATE
+    phases = rng.uniform(0.0, 2.0 * math.pi, 3)
+    tones = zip((0.7, 1.1, 1.6), phases, strict=True)
+    wanted = 0.01 * sum(np.sin(2.0 * math.pi * hertz * time + p) - np.sin(p) for hertz, p in tones)
+    last = [0.0]
+
+    def force(row, q):
+        slope, last[0] = (q - last[0]) * RATE, q
+        return 3000.0 * (wanted[row] - q) - 60.0 * slope
+
+    motion = stick_slip.simulate(AXIS, HIDDEN, Transmission(), force, len(time))
+    read = STEP * np.round(motion.q / STEP)
+    return Trial(time, {"load_command": -motion.command}, {"contraction": read})
+
+
+@pytest.mark.campaign
+def test_friction_and_damping_by_direction_are_found_together():
+    diagnosis = diagnose([controlled(1)], given(), propose=False)
+    named = {each.name: each for each in diagnosis.effects}
+    assert set(named) == {"coulomb_friction", "directional_damping"}, diagnosis.sentence
+    dynamic = named["coulomb_friction"].parameters["dynamic_n"].value
+    assert dynamic == pytest.approx(8.0, rel=0.05)
+    difference = named["directional_damping"].parameters["difference_n_s_per_mm"].value
+    assert abs(difference) == pytest.approx(0.012, rel=0.1)
+
+
+def test_a_journal_tells_fits_of_short_pieces_from_those_of_the_trials(tmp_path):
+    """Also where both begin, or end, at the same values."""
+    problem = problem_of([*driven_slide(12.0, lanes=2, seconds=2.0, rate=50)])
+    short = in_short_pieces(problem)
+    begun = problem.fit(problem.given)
+    assert begun is not None
+    journal = Journal(tmp_path, problem.trials, problem.given, "one question")
+    both = {id(each): refit(each, begun, (), journal) for each in (short, problem)}
+    assert both[id(short)].chi_square != both[id(problem)].chi_square
+    for each in (short, problem):
+        again = refit(each, begun, (), journal)
+        assert again.chi_square == both[id(each)].chi_square == each.fit(begun.model).chi_square
+
+
+def test_searches_use_at_most_half_of_the_pieces_evenly():
+    problem = problem_of([*driven_slide(12.0, lanes=3, seconds=9.0, rate=50)])
+    files = tuple(f"{number // 9}" for number in range(len(problem.trials)))
+    pieces = replace(problem, files=files)
+    fewer = with_fewer_pieces(pieces)
+    assert len(pieces.trials) > 2 * PIECES and len(fewer.trials) == PIECES
+    assert set(fewer.files) == set(files) and len(set(fewer.wholes)) == PIECES
+    for whole, piece in zip(fewer.wholes, fewer.trials, strict=True):
+        assert piece is pieces.trials[whole]
+    again = with_fewer_pieces(replace(pieces, trials=pieces.trials[:10], files=files[:10]))
+    assert len(again.trials) == 10
+    # Whole trials may each have a condition of their own.
+    assert with_fewer_pieces(problem) is problem

@@ -1,4 +1,7 @@
-"""What a contact deflects before it slips differs by powers of ten; the trials say which it is."""
+"""What a contact deflects before it slips differs by powers of ten; the trials say which it is.
+
+A limit that is never reached, and a law whose chi-square is rugged, are fitted all the same.
+"""
 
 import numpy as np
 import pytest
@@ -6,8 +9,9 @@ import pytest
 from pma_gym import Plant
 from pma_gym.data.datasets.dataset import NamedTrial
 from pma_gym.data.trial import Trial
+from pma_gym.discovery import diagnose
 from pma_gym.discovery.fitting.fit_problem import FitProblem
-from pma_gym.discovery.fitting.free_parameters import free_parameters, values
+from pma_gym.discovery.fitting.free_parameters import at_limit, free_parameters, values
 from pma_gym.discovery.fitting.journal import Journal
 from pma_gym.discovery.preparation.noise import white_noise
 from pma_gym.discovery.preparation.prepared_trials import prepared
@@ -15,7 +19,7 @@ from pma_gym.discovery.screening.candidates import candidate_effects
 from pma_gym.discovery.selection import scanned_parameters
 from pma_gym.discovery.selection.scanned_parameters import with_scanned
 from pma_gym.effects import CATALOGUE
-from pma_gym.plant.model import Model
+from pma_gym.plant.model import Model, load_model
 
 PRESLIDING = "joint_friction.presliding_deg"
 NOISE = np.radians(0.02)
@@ -118,6 +122,34 @@ def test_a_contact_stays_rigid_where_no_rung_explains_more():
     assert abs(rung.estimate(share)[0] - 8.0) > 3.0 * error
 
 
-def test_what_is_scanned_is_held():
-    for effect in CATALOGUE.values():
-        assert set(effect.scanned) <= set(effect.held)
+def _trials(model: Model) -> list[Trial]:
+    time = np.arange(0.0, 5.0, 1 / 64)
+    trials = []
+    for seed, (volts, period) in enumerate(((1.5, 2.0), (2.5, 1.2), (2.0, 3.0)), 1):
+        motor = 0.5 * volts * (1.0 - np.cos(2.0 * np.pi * time / period))
+        regulator = 5.5 + 2.0 * np.sign(np.sin(2.0 * np.pi * time / (0.7 * period) + 0.3))
+        commands = {"motor_voltage": motor, "regulator_voltage": regulator}
+        trials.append(Plant(model).simulate(Trial(time, commands), seed=seed))
+    return trials
+
+
+@pytest.mark.campaign
+def test_a_limit_that_is_never_reached_is_fitted_from_its_own_size() -> None:
+    """The steps of its derivatives come from its value, not from bounds a million times as wide."""
+    hidden = {"regulator_rate_limit": {"limit_kpa_per_s": 600.0}}
+    rig = load_model("serres2008").with_effects(hidden)
+    fitted = diagnose(_trials(rig), "serres2008", propose=False)
+    assert fitted.verdict == "effect"
+    (effect,) = fitted.effects
+    assert effect.name == "regulator_rate_limit"
+    limit = effect.parameters["limit_kpa_per_s"]
+    assert limit.value == pytest.approx(600.0, rel=0.02)
+    assert limit.limit == ""
+    assert not fitted.unfitted
+
+
+def test_a_boundless_range_has_a_lower_end_only_where_it_begins() -> None:
+    """A value far above the lower end is not there because the upper end is farther."""
+    assert at_limit(638.0, 10.0, 1e9) == ""
+    assert at_limit(10.0, 10.0, 1e9) == "lower"
+    assert at_limit(1e9, 10.0, 1e9) == "upper"

@@ -1,16 +1,18 @@
 """Columns in another unit are named before anything is fitted; the proposed lines correct them."""
 
 import re
+from functools import cache
 
 import numpy as np
 import pytest
 
+from pma_gym.data.calibration import LVDT
 from pma_gym.data.datasets.dataset import Dataset, NamedTrial, read_dataset
 from pma_gym.data.files.trial_files import TrialWarning
 from pma_gym.data.trial import Trial, TrialError
+from pma_gym.data.trial_columns import BY_NAME
 from pma_gym.discovery.preparation.data_checks import check_dataset
 from pma_gym.discovery.screening.candidates import candidate_effects
-from pma_gym.plant.plant import Plant
 from tests.discovery.preparation.data_checks.logs import GIVEN, checked, log, logs, write
 
 BAR = "pressure_kpa"
@@ -30,8 +32,23 @@ KINDS = {
 }
 
 
-def spoilt(name, factor, offset):
-    return [{**each, name: factor * each[name] + offset} for each in logs()]
+def changed(change):
+    """The three logs, of which each column's values are changed by a function of its name."""
+    return [{name: change(name, values) for name, values in each.items()} for each in logs()]
+
+
+@cache
+def right(folder):
+    """The three logs as they are, checked."""
+    return checked(write(folder, logs()))
+
+
+def refusal(folder, match="--no-checks"):
+    """What a folder is refused with, and its check once that is followed."""
+    with pytest.raises(TrialError, match=match) as caught:
+        checked(folder)
+    (folder / "dataset.toml").write_text(lines_of(str(caught.value)))
+    return str(caught.value), checked(folder)
 
 
 def lines_of(message):
@@ -42,22 +59,15 @@ def lines_of(message):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_unit_is_named_and_its_line_corrects_it(tmp_path, kind):
+def test_a_unit_is_named_and_its_line_corrects_it(tmp_path, tmp_path_factory, kind):
     name, factor, offset, words = KINDS[kind]
-    folder = write(tmp_path / "lab", spoilt(name, factor, offset))
-    with pytest.raises(TrialError, match="--no-checks") as caught:
-        checked(folder)
-    message = str(caught.value)
-    assert words in message
-    assert name in message
-    (folder / "dataset.toml").write_text(lines_of(message))
-    right = write(tmp_path / "right", logs())
-    corrected = checked(folder)
+    spoilt = changed(lambda k, v: factor * v + offset if k == name else v)
+    message, corrected = refusal(write(tmp_path / "lab", spoilt))
+    assert words in message and name in message
     assert corrected.checked == ()
-    quantity = {"contraction_mm": "contraction", "rotation_deg": "rotation"}.get(
-        name, name.partition("_")[0]
-    )
-    for ours, theirs in zip(corrected.trials, read_dataset(right).trials, strict=True):
+    quantity = BY_NAME[name].quantity
+    base = right(tmp_path_factory.getbasetemp() / "right")
+    for ours, theirs in zip(corrected.trials, base.trials, strict=True):
         there, given = (each.trial.measurements[quantity] for each in (theirs, ours))
         # A zero of its own stays a lab's; the air of another day is another pressure.
         spread = 1e-5 * np.ptp(there) + (7e3 if quantity == "pressure" else 0.0)
@@ -80,66 +90,45 @@ BOTH = {
 )
 def test_command_and_reading_alike_are_in_another_unit(tmp_path, kind, unread):
     factor, offset, words = BOTH[kind]
-    right = [{k: v for k, v in each.items() if k not in unread} for each in logs()]
-    both = [
-        {k: factor * v + offset if "pressure" in k else v for k, v in each.items()}
-        for each in right
-    ]
-    folder = write(tmp_path / "lab", both)
-    with pytest.raises(TrialError, match=re.escape(words)) as caught:
-        checked(folder)
-    written = lines_of(str(caught.value))
-    assert written.count("pressure_") == 2 * (2 - (BAR in unread))
-    (folder / "dataset.toml").write_text(written)
-    assert checked(folder).checked == checked(write(tmp_path / "right", right)).checked
+    both = changed(lambda k, v: factor * v + offset if "pressure" in k else v)
+    for each in both:
+        for name in unread:
+            del each[name]
+    message, corrected = refusal(write(tmp_path / "lab", both), re.escape(words))
+    assert lines_of(message).count("pressure_") == 2 * (2 - (BAR in unread))
+    assert all("late" in words for words in corrected.checked)
 
 
 def test_a_command_alone_may_be_absolute(tmp_path):
-    written = [
-        {k: v + 101.325 * (k == "pressure_command_kpa") for k, v in each.items()} for each in logs()
+    written = changed(lambda k, v: v + 101.325 * (k == "pressure_command_kpa"))
+    _, corrected = refusal(write(tmp_path / "lab", written), "the command is an absolute pressure")
+    assert corrected.checked == ()
+
+
+def renamed(name, change):
+    """The logs with the contraction by another name, changed."""
+    return [
+        {k: v for k, v in each.items() if k != "contraction_mm"}
+        | {name: change(each["contraction_mm"])}
+        for each in logs()
     ]
-    folder = write(tmp_path / "lab", written)
-    with pytest.raises(TrialError, match="the command is an absolute pressure") as caught:
-        checked(folder)
-    (folder / "dataset.toml").write_text(lines_of(str(caught.value)))
-    assert checked(folder).checked == ()
 
 
 def test_a_line_that_is_there_is_replaced_by_one_that_holds_both(tmp_path):
     """A lab's own name, factor, offset and range are kept in the proposal."""
-    written = [
-        {
-            "Weg [cm]" if k == "contraction_mm" else k: 60.0 - v / 10
-            if k == "contraction_mm"
-            else v
-            for k, v in each.items()
-        }
-        for each in logs()
-    ]
     line = '"Weg [cm]" = { name = "contraction_mm", offset = 1.0, range = [0, 70] }'
+    written = renamed("Weg [cm]", lambda x: 60.0 - x / 10)
     folder = write(tmp_path / "lab", written, f"[columns]\n{line}\n")
-    with pytest.raises(TrialError, match="replace the line of this name by") as caught:
-        checked(folder)
+    message, corrected = refusal(folder, "replace the line of this name by")
     proposed = (
         '"Weg [cm]" = { name = "contraction_mm", factor = -10, offset = 600, range = [-90, 610] }'
     )
-    assert proposed in str(caught.value)
-    (folder / "dataset.toml").write_text(f"[columns]\n{proposed}\n")
-    assert checked(folder).checked == ()
+    assert proposed in message and corrected.checked == ()
 
 
 def test_raw_volts_are_corrected_in_volts(tmp_path):
-    from pma_gym.data.calibration import LVDT
-
-    written = []
-    for each in logs():
-        kept = {k: v for k, v in each.items() if k != "contraction_mm"}
-        written.append(kept | {"lvdt_v": LVDT.to_volts(-1e-3 * each["contraction_mm"])})
-    folder = write(tmp_path / "lab", written)
-    with pytest.raises(TrialError, match="the opposite sign") as caught:
-        checked(folder)
-    (folder / "dataset.toml").write_text(lines_of(str(caught.value)))
-    corrected = checked(folder)
+    folder = write(tmp_path / "lab", renamed("lvdt_v", lambda x: LVDT.to_volts(-1e-3 * x)))
+    _, corrected = refusal(folder, "the opposite sign")
     assert corrected.checked == ()
     right = 1e-3 * logs()[0]["contraction_mm"]
     assert corrected.trials[0].trial.measurements["contraction"] == pytest.approx(right, abs=1e-6)
@@ -147,8 +136,8 @@ def test_raw_volts_are_corrected_in_volts(tmp_path):
 
 def test_one_file_in_another_unit_is_named(tmp_path):
     written = logs()
-    written[1] = {**written[1], "contraction_mm": written[1]["contraction_mm"] / 25.4}
-    written[2] = {**written[2], "contraction_mm": written[2]["contraction_mm"] / 25.4}
+    for each in written[1:]:
+        each["contraction_mm"] /= 25.4
     folder = write(tmp_path / "lab", written)
     with pytest.raises(TrialError, match="in trial1.csv, trial2.csv") as caught:
         checked(folder)
@@ -161,23 +150,14 @@ def test_one_file_in_another_unit_is_named(tmp_path):
 
 
 def test_several_columns_are_said_at_once_and_may_be_overruled(tmp_path):
-    written = [
-        {
-            k: v * {"contraction_mm": -1.0, "load_n": 1 / 9.80665}.get(k, 1.0)
-            for k, v in each.items()
-        }
-        for each in logs()
-    ]
-    folder = write(tmp_path / "lab", written)
-    with pytest.raises(TrialError) as caught:
+    factors = {"contraction_mm": -1.0, "load_n": 1 / 9.80665}
+    folder = write(tmp_path / "lab", changed(lambda k, v: v * factors.get(k, 1.0)))
+    with pytest.raises(TrialError, match="(?s)the opposite sign.*kilograms-force"):
         checked(folder)
-    assert "the opposite sign" in str(caught.value)
-    assert "kilograms-force" in str(caught.value)
-    said = checked(folder, stop=False).checked
-    assert len(said) == 2
+    assert len(checked(folder, stop=False).checked) == 2
 
 
-def test_good_data_pass_unchanged(tmp_path):
+def test_good_data_pass_unchanged_and_so_does_what_nothing_can_be_compared_with(tmp_path):
     folder = write(tmp_path / "lab", logs())
     before, after = read_dataset(folder), checked(folder)
     assert after.checked == ()
@@ -185,67 +165,46 @@ def test_good_data_pass_unchanged(tmp_path):
         assert np.array_equal(one.trial.time, other.trial.time)
         for name, values in one.trial.measurements.items():
             assert np.array_equal(values, other.trial.measurements[name])
+    alone = {k: v for k, v in log(2.0, 300.0, 1).items() if not k.startswith("pressure_")}
+    assert checked(write(tmp_path / "alone", [alone])).checked == ()
 
 
-LARGEST = [
-    (each.name, row) for each in candidate_effects(GIVEN, [0, 1, 2]) for row in each.probes[-1:]
-]
+LARGEST = {each.name: each for each in candidate_effects(GIVEN, [0, 1, 2]) if len(each.probes)}
 
 
-@pytest.mark.parametrize(("name", "row"), LARGEST, ids=[name for name, _ in LARGEST])
-def test_missing_physics_is_no_unit(tmp_path, name, row):
+@pytest.mark.parametrize("name", LARGEST)
+def test_missing_physics_is_no_unit(tmp_path, name):
     """Every effect of the catalogue at the largest size that is looked for."""
-    candidate = next(each for each in candidate_effects(GIVEN, [0, 1, 2]) if each.name == name)
-    truth = candidate.beside(GIVEN).replace(
-        dict(zip(candidate.paths, map(float, row), strict=True))
-    )
+    candidate = LARGEST[name]
+    largest = dict(zip(candidate.paths, map(float, candidate.probes[-1]), strict=True))
     named = []
-    for number, each in enumerate(logs(truth=truth)):
-        trial = Trial(
-            each["time_s"],
-            {
-                "motor_voltage": each["motor_voltage_v"],
-                "pressure_command": 1e3 * each["pressure_command_kpa"],
-            },
-            {
-                "contraction": each["contraction_mm"] / 1e3,
-                "rotation": np.radians(each["rotation_deg"]),
-                "load": each["load_n"],
-                "pressure": 1e3 * each["pressure_kpa"],
-            },
-        )
-        named.append(NamedTrial(f"trial{number}", trial))
+    for number, each in enumerate(logs(truth=candidate.beside(GIVEN).replace(largest))):
+        si = {BY_NAME[k].quantity: BY_NAME[k].to_si(v) for k, v in each.items()}
+        commands = {k: si.pop(k) for k in ("motor_voltage", "pressure_command")}
+        named.append(NamedTrial(f"trial{number}", Trial(si.pop("time"), commands, si)))
     data = check_dataset(Dataset("", None, tuple(named), tmp_path), GIVEN)
     assert [words for words in data.checked or () if "late" not in words] == []
 
 
-def test_signals_that_are_late_together_are_named(tmp_path):
-    late = []
-    for each in logs(truth=GIVEN):
-        moved = {k: np.interp(each["time_s"] - 0.04, each["time_s"], v) for k, v in each.items()}
-        names = ("contraction_mm", "rotation_deg", "load_n")
-        late.append({k: moved[k] if k in names else v for k, v in each.items()})
-    (words,) = checked(write(tmp_path / "lab", late)).checked
-    assert words.startswith("contraction_mm, rotation_deg, load_n are late by the same 40 ms")
-
-
-def test_a_sensor_that_is_late_alone_is_named(tmp_path):
-    late = [
-        {**e, "load_n": np.interp(e["time_s"] - 0.03, e["time_s"], e["load_n"])}
-        for e in logs(truth=GIVEN)
-    ]
+@pytest.mark.parametrize(
+    ("names", "seconds", "said"),
+    [
+        (
+            ("contraction_mm", "rotation_deg", "load_n"), 0.04,
+            "contraction_mm, rotation_deg, load_n are late by the same 40 ms",
+        ),
+        (("load_n",), 0.03, "load_n alone is late, by 30 ms"),
+    ],
+)  # fmt: skip
+def test_what_is_late_is_named(tmp_path, names, seconds, said):
+    late = logs(truth=GIVEN)
+    for each in late:
+        moved = {k: np.interp(each["time_s"] - seconds, each["time_s"], each[k]) for k in names}
+        each.update(moved)
     folder = write(tmp_path / "lab", late)
     (words,) = checked(folder).checked
-    assert words.startswith("load_n alone is late, by 30 ms") and words.endswith("lag or delay")
-    named = GIVEN.with_effects({"load_cell_delay": {"share": 1.0, "delay_ms": 30.0}})
-    assert check_dataset(read_dataset(folder), named).checked == ()
-
-
-def test_commands_that_no_model_follows_are_left_to_the_fit(tmp_path):
-    """A check says nothing where it has nothing to compare with."""
-    columns = log(2.0, 300.0, 1)
-    without = {
-        k: v for k, v in columns.items() if k not in ("pressure_command_kpa", "pressure_kpa")
-    }
-    assert checked(write(tmp_path / "lab", [without])).checked == ()
-    assert Plant(GIVEN).model.name == "serres2008"
+    assert words.startswith(said)
+    if names == ("load_n",):
+        assert words.endswith("lag or delay")
+        known = GIVEN.with_effects({"load_cell_delay": {"share": 1.0, "delay_ms": 30.0}})
+        assert check_dataset(read_dataset(folder), known).checked == ()
