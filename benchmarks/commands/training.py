@@ -9,11 +9,7 @@ from typing import Annotated
 
 import typer
 
-from benchmarks.commands.options import (
-    INTERRUPTED,
-    RESULTS,
-    refuse,
-)
+from benchmarks.commands.options import INTERRUPTED, RESULTS, refuse
 
 
 def register(app: typer.Typer) -> None:
@@ -53,7 +49,7 @@ def train(
     """Train policies on stations of no suite; an interrupted training goes on."""
     usual = RESULTS / "training" / f"{Path(preset).stem}-{algo}"
     folder = out or usual / f"{task}-{seed}"
-    with _failures_in_words(folder):
+    with _failures_in_words():
         from benchmarks.training.preset import PresetError
         from benchmarks.training.train_policies import ordered, run_train
         from pma_gym.terminal import SafeConsole
@@ -70,12 +66,8 @@ def train(
 
 
 @contextmanager
-def _failures_in_words(folder: Path) -> Iterator[None]:
-    """End the program with a message of what stopped a training.
-
-    Args:
-        folder: of its checkpoint.
-    """
+def _failures_in_words() -> Iterator[None]:
+    """End the program with a message of what stopped a training."""
     try:
         from benchmarks.training.checkpoint import CheckpointError
         from benchmarks.training.preset import PresetError

@@ -1,1 +1,1 @@
-"""Training of policies: presets, stations to train on, runs that resume, export, studies."""
+"""Training of policies: presets, stations to train on, runs that resume, export."""
