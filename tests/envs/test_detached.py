@@ -13,7 +13,7 @@ from pma_gym.envs import Measurement, PMAEnv, Reference
 from pma_gym.plant.plant import Plant
 from pma_gym.tasks import following
 
-TASKS = ["displacement", "rotation_multisine", "isotonic", "isotonic_exercise"]
+TASKS = ["displacement", "isotonic_exercise"]
 SHARED = (type, types.ModuleType, types.BuiltinFunctionType)
 """What is the same for the whole process; nothing of one episode is looked for behind it."""
 
@@ -77,11 +77,10 @@ def vandalise(station, reference):
     object.__setattr__(station, "period", 1.0)
 
 
-@pytest.mark.parametrize("task", TASKS[:2])
-def test_changing_what_a_controller_receives_changes_no_simulation(task):
+def test_changing_what_a_controller_receives_changes_no_simulation():
     runs = []
     for by_force in (False, True):
-        env = made(task)
+        env = made("displacement")
         if by_force:
             vandalise(env.station, env.reference)
         rewards, done = [], False

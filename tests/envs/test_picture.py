@@ -1,7 +1,5 @@
 """The picture shows the station and the trial."""
 
-import time
-
 import numpy as np
 import pytest
 
@@ -59,17 +57,8 @@ def test_picture_says_why_an_episode_ended(make, follow):
     assert red.sum() > 50
 
 
-def test_pictures_are_quick_enough_for_a_film(env):
-    env.render()
-    start = time.perf_counter()
-    for _ in range(10):
-        env.render()
-    # About 150 a second on one core; a loaded machine may take its time.
-    assert (time.perf_counter() - start) / 10 < 0.2
-
-
 def test_frames_of_every_step_play_in_real_time(make):
-    assert make(control_rate_hz=50.0).metadata["render_fps"] == 50
+    assert make(control_rate_hz=10.0).metadata["render_fps"] == 10
     assert type(make()).metadata["render_fps"] == 100
 
 

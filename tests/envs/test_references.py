@@ -79,14 +79,6 @@ def _bow(time):
     return 4.4e-3 * time * (3.0 - time)
 
 
-def test_a_batch_has_the_bits_of_environments_alone(twins):
-    both = twins(17, multisine("extension", 5), pressure_kpa="random")
-    both.reset(seed=3)
-    for _ in range(110):
-        both.step(-0.8, -0.3)
-    assert both.ends.sum() >= 17
-
-
 def test_references_of_one_structure_share_their_code(make, monkeypatch):
     libraries = {make(multisine("extension", seed))._engine.kernel.library for seed in range(4)}
     libraries.add(make("displacement_steps")._engine.kernel.library)

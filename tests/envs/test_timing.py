@@ -4,16 +4,12 @@ import numpy as np
 import pytest
 
 from pma_gym.metrics import PHASE_SAMPLES, phase_times, rmse
-from pma_gym.plant.model import shipped_models
 from pma_gym.plant.plant import Plant
 
-EVERY_MODEL = [
-    *((name, "displacement") for name in sorted(shipped_models())),
-    ("station", "rotation"),
-]
+MODELS = [("station", "rotation"), ("serres2008", "displacement"), ("cascade", "displacement")]
 
 
-@pytest.mark.parametrize(("model", "task"), EVERY_MODEL)
+@pytest.mark.parametrize(("model", "task"), MODELS)
 def test_states_are_those_of_the_plant_under_the_held_voltages(make, task, model):
     env = make(task, model=model)
     env.reset(seed=1)
@@ -37,11 +33,9 @@ def test_states_are_those_of_the_plant_under_the_held_voltages(make, task, model
 @pytest.mark.parametrize(
     ("task", "rate", "steps"),
     [
-        ("displacement", 100.0, 501),
-        ("rotation", 100.0, 1501),
-        ("displacement", 384.0, 1922),
-        ("rotation", 20, 301),
         ("displacement", 1000.0, 5006),
+        ("displacement", 384.0, 1922),
+        ("rotation", 20.0, 301),
     ],
 )
 def test_episode_ends_with_its_last_sample(make, follow, task, rate, steps):
@@ -53,13 +47,6 @@ def test_episode_ends_with_its_last_sample(make, follow, task, rate, steps):
     position = env.trajectory()
     assert needed <= len(position) <= needed + 384 / rate
     assert np.all(np.isfinite(position))
-
-
-def test_truncated_only_at_the_end(make):
-    env = make(control_rate_hz=10.0)
-    env.reset(seed=0)
-    ends = [env.step(env.action(0.0))[2:4] for _ in range(51)]
-    assert ends == [(False, False)] * 50 + [(False, True)]
 
 
 def test_reference_and_position_are_compared_at_the_same_time(make):
@@ -76,7 +63,7 @@ def test_reference_and_position_are_compared_at_the_same_time(make):
 
 @pytest.mark.parametrize(
     ("task", "rates"),
-    [("displacement", (20.0, 100.0, 384.0, 1000.0)), ("rotation", (20.0, 100.0))],
+    [("displacement", (100.0, 384.0, 1000.0)), ("rotation", (20.0, 100.0))],
 )
 def test_samples_are_the_same_at_every_control_rate(make, follow, ramp, task, rates):
     scores, paths = [], []
@@ -100,30 +87,23 @@ def test_samples_at_the_ends_of_steps_are_the_states_there(make):
     assert len(env.trajectory()) == 301
 
 
-@pytest.mark.parametrize("task", ["displacement", "rotation"])
-def test_rmse_is_that_of_the_trajectory(make, follow, ramp, task):
-    env = make(task)
+def test_rmse_is_that_of_the_trajectory(make, follow, ramp):
+    env = make("rotation")
     info = follow(env, ramp)
-    unit, factor = env.task.schedule.unit, {"mm": 1e-3, "deg": np.pi / 180}[env.task.schedule.unit]
-    ideals = {"mm": [lambda t: 5 * t]} | {
-        "deg": [lambda t: 18 * t, lambda t: 90 + 0 * t, lambda t: 90 - 18 * t]
-    }
-    path = env.trajectory() / factor
+    ideals = [lambda t: 18 * t, lambda t: 90 + 0 * t, lambda t: 90 - 18 * t]
+    path = np.degrees(env.trajectory())
     errors = [
-        path[1920 * i : 1920 * i + 1923] - ideal(phase_times())
-        for i, ideal in enumerate(ideals[unit])
+        path[1920 * i : 1920 * i + 1923] - ideal(phase_times()) for i, ideal in enumerate(ideals)
     ]
-    by_phase = list(env.episode_summary()[f"rmse_by_phase_{unit}"].values())
+    by_phase = list(env.episode_summary()["rmse_by_phase_deg"].values())
     assert by_phase == pytest.approx([rmse(error) for error in errors])
-    assert info[f"rmse_{unit}"] == pytest.approx(rmse(np.concatenate(errors)))
-    span = {"mm": 25, "deg": 90}[unit]
-    assert info["percent_of_range"] == pytest.approx(100 * info[f"rmse_{unit}"] / span)
+    assert info["rmse_deg"] == pytest.approx(rmse(np.concatenate(errors)))
+    assert info["percent_of_range"] == pytest.approx(100 * info["rmse_deg"] / 90)
     assert env.ended_by == ""
 
 
-@pytest.mark.parametrize("steps", [1, 10])
-def test_a_delayed_action_acts_so_many_whole_steps_later(make, steps):
-    prompt = make()
+def test_a_delayed_action_acts_so_many_whole_steps_later(make):
+    steps, prompt = 10, make()
     late = make(action_delay_s=0.01 * steps)
     prompt.reset(seed=0)
     late.reset(seed=0)
@@ -145,9 +125,8 @@ def test_a_delayed_action_acts_so_many_whole_steps_later(make, steps):
     np.testing.assert_allclose(late.condition.state, states[39 - steps], rtol=1e-7, atol=1e-9)
 
 
-@pytest.mark.parametrize("steps", [1, 4])
-def test_a_delayed_reading_is_that_of_so_many_steps_before(make, steps):
-    prompt = make(history=2)
+def test_a_delayed_reading_is_that_of_so_many_steps_before(make):
+    steps, prompt = 4, make(history=2)
     late = make(history=2, observation_delay_s=0.01 * steps)
     prompt.reset(seed=3)
     late.reset(seed=3)
@@ -161,26 +140,3 @@ def test_a_delayed_reading_is_that_of_so_many_steps_before(make, steps):
             measured = [0, 1, 2, 3, 7, 8]
             np.testing.assert_array_equal(observation[measured], observations[k - steps][measured])
         assert late.truth == prompt.truth
-
-
-def test_preview_holds_the_references_of_the_steps_to_come(make):
-    env = make("rotation", preview=3, control_rate_hz=10.0)
-    observation, _ = env.reset(seed=0)
-    for k in range(150):
-        ideal = [env.reference(0.1 * (k + ahead)) / (np.pi / 2) for ahead in range(4)]
-        np.testing.assert_allclose(observation[[4, 6, 7, 8]], ideal, atol=1e-6)
-        observation, *_ = env.step(env.action(0.0))
-
-
-@pytest.mark.parametrize(("model", "task"), EVERY_MODEL)
-def test_zero_volts_keep_the_muscle_at_rest(make, model, task):
-    env = make(task, model=model)
-    _, start = env.reset(seed=0)
-    truth = dict(env.truth)
-    for _ in range(300):
-        *_, info = env.step(env.action(0.0))
-    # 0.1 nm, 0.1 nrad, and the pressure to 10 digits.
-    assert env.truth == pytest.approx(truth, rel=1e-10, abs=1e-10)
-    position = {"displacement": "extension_mm", "rotation": "rotation_deg"}[task]
-    assert info[position] == pytest.approx(0.0, abs=1e-6)
-    assert info["pressure_kpa"] == pytest.approx(start["pressure_kpa"]) == pytest.approx(300.0)

@@ -1,9 +1,7 @@
 """An environment's tolerance: how exact the integration is, and at what price."""
 
 import numpy as np
-import pytest
 
-from pma_gym.envs import PMAVectorEnv
 from pma_gym.plant.compiled_model import DEFAULT_TOLERANCE
 from pma_gym.plant.plant import Plant
 
@@ -50,31 +48,6 @@ def test_stations_that_are_drawn_have_it_too(make):
     assert 1e-6 < np.abs(rough - fine).max() / np.ptp(fine) < 1e-2
 
 
-@pytest.mark.parametrize("randomisation", ["none", "intervals"])
-def test_a_batch_has_the_bits_of_one(make, randomisation):
-    options = {"randomisation": randomisation, "tolerance": 5e-3}
-    one = make(**options)
-    many = PMAVectorEnv(5, model="serres2008", pressure_kpa=300.0, threads=2, **options)
-    first, _ = one.reset(seed=7)
-    both, _ = many.reset(seed=7)
-    np.testing.assert_array_equal(first, both[0])
-    for action in np.random.default_rng(0).uniform(-1.0, -0.4, (40, 1)).astype(np.float32):
-        single = one.step(action)
-        together = many.step(np.tile(action, (5, 1)))
-        np.testing.assert_array_equal(single[0], together[0][0])
-        assert single[1] == together[1][0]
-
-
 def test_it_compiles_nothing_anew(make):
     one, other = make(), make(tolerance=1e-3)
     assert one._engine.kernel.library is other._engine.kernel.library
-
-
-@pytest.mark.parametrize(
-    "tolerance", [0.0, -1e-3, 0.2, 1e-11, float("nan"), 10**400, "1e-3", None, True]
-)
-def test_what_is_no_tolerance_is_refused(make, tolerance):
-    words = r"tolerance must be a share in 1e-10 to 0\.1 of the states' scales, got "
-    with pytest.raises(ValueError, match=words) as caught:
-        make(tolerance=tolerance)
-    assert f"got {tolerance!r}; the default is {DEFAULT_TOLERANCE:g}" in str(caught.value)

@@ -6,6 +6,7 @@ import pytest
 from pma_gym.envs import PMAVectorEnv
 from pma_gym.plant.model import load_model
 from pma_gym.plant.sensors import noise_levels
+from pma_gym.tasks import EXERCISES, multisine
 
 EPISODE = 51
 """Steps of a displacement at 10 Hz."""
@@ -17,13 +18,56 @@ SEVERAL = {
 """Nearly everything at once."""
 
 
-@pytest.mark.parametrize(("count", "threads"), [(1, 1), (16, 1), (17, 2), (33, 2)])
-def test_a_batch_is_gymnasiums_own_loop(twins, fragile, count, threads):
-    both = twins(count, model=fragile, batch={"threads": threads})
+def heavier(nominal, generator):
+    """A slide of up to twice the mass."""
+    mass = nominal.values_in_files("slide")["mass_kg"]
+    return nominal.replace({"slide.mass_kg": mass * (1.0 + generator.random())})
+
+
+def smooth(error_percent, action_change, position, reference):
+    """The reward `smooth`, as a user would write it."""
+    return -abs(error_percent) - 0.1 * action_change
+
+
+RANDOM = {"pressure_kpa": "random", "max_episode_steps": 40}
+BOTH = "regulator_and_hand_push"
+CASES = {
+    "alone": (1, 1, {}),
+    "all lanes": (16, 1, {}),
+    "one more": (17, 2, {}),
+    "many": (33, 2, {}),
+    "own reward": (
+        17, 2, RANDOM | {"randomisation": "intervals", "tolerance": 5e-3, "reward": smooth,
+        "reward_scale": 0.25, "autoreset_mode": "SameStep"},
+    ),
+    "own randomisation": (3, 1, RANDOM | {"randomisation": heavier}),
+    "nearly everything": (
+        18, 1, RANDOM | SEVERAL | {"task": "rotation", "model": "station", "disturbances": BOTH},
+    ),
+    "multisine": (
+        18, 1, RANDOM | {"task": multisine("extension", 5), "model": "cascade", "noise": False,
+        "preview": 4, "control_rate_hz": 384.0 / 5.0},
+    ),
+    "isotonic": (
+        17, 1, RANDOM | {"task": "isotonic", "model": "station", "randomisation": "varied",
+        "disturbances": BOTH, "autoreset_mode": "SameStep"},
+    ),
+    **{
+        task: (5, 2, RANDOM | {"task": task, "model": "station", "control_rate_hz": 100.0})
+        for task in EXERCISES
+    },
+}  # fmt: skip
+"""How many environments, threads, and options of each environment."""
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_a_batch_is_gymnasiums_own_loop(twins, fragile, case):
+    count, threads, options = CASES[case]
+    both = twins(count, batch={"threads": threads}, **({"model": fragile} | options))
     both.reset(seed=5)
     for _ in range(3 * EPISODE):
         both.step()
-    assert both.ends[0].sum() > 2 * count
+    assert both.ends.sum() > 2 * count
 
 
 @pytest.mark.parametrize(("threads", "options"), [(2, {}), (5, {"randomisation": "varied"})])
@@ -107,34 +151,6 @@ def test_without_autoreset_a_mask_says_who_begins_anew(twins, fragile):
             seeds = None if k % 2 else [k + i if i % 3 else None for i in range(17)]
             both.reset(seed=seeds, options={"reset_mask": over})
     assert both.ends[0].sum() > 30
-
-
-@pytest.mark.parametrize(
-    ("name", "randomisation"),
-    [("serres2008", "intervals"), ("station", "varied"), ("cascade", "none")],
-)
-def test_models_and_their_randomisation(twins, name, randomisation):
-    options = {"model": name, "randomisation": randomisation, "pressure_kpa": "random"}
-    both = twins(18, **options)
-    for _ in range(2):
-        both.reset(seed=11)
-        for _ in range(EPISODE + 5):
-            both.step(-1.0, -0.5)
-
-
-@pytest.mark.parametrize(
-    "options",
-    [
-        {"noise": False, "preview": 4, "control_rate_hz": 384.0 / 5.0},
-        SEVERAL | {"task": "rotation", "model": "station"},
-    ],
-    ids=",".join,
-)
-def test_options(twins, options):
-    both = twins(17, **options)
-    both.reset(seed=1)
-    for _ in range(EPISODE + 9):
-        both.step(-0.9, -0.4)
 
 
 def test_each_environment_has_its_own_pressures(twins):

@@ -5,7 +5,7 @@ import inspect
 import gymnasium as gym
 import numpy as np
 import pytest
-from gymnasium.vector import AutoresetMode, SyncVectorEnv
+from gymnasium.vector import AutoresetMode
 from gymnasium.wrappers.vector import RecordEpisodeStatistics
 
 from pma_gym.envs import ENVIRONMENTS, PMAEnv, PMAVectorEnv
@@ -28,13 +28,6 @@ def test_ids_make_batches(name):
     assert type(again) is PMAVectorEnv and again.num_envs == 5
     np.testing.assert_array_equal(again.reset(seed=3)[0], observations)
     envs.close()
-
-
-def test_gymnasiums_own_loop_is_made_as_before():
-    envs = gym.make_vec(NAME, 2, vectorization_mode="sync", **MADE)
-    assert type(envs) is SyncVectorEnv
-    ours = gym.make_vec(NAME, 2, **MADE)
-    np.testing.assert_array_equal(envs.reset(seed=1)[0], ours.reset(seed=1)[0])
 
 
 @pytest.mark.parametrize("mode", list(AutoresetMode))
@@ -76,22 +69,6 @@ def test_gymnasiums_statistics_count_episodes(batch, mode):
     assert envs.episode_count == 12
 
 
-def test_the_same_seed_gives_the_same_bits(batch):
-    def episode(envs: PMAVectorEnv) -> list[bytes]:
-        bits = [envs.reset(seed=4)[0].tobytes()]
-        for k in range(70):
-            observations, rewards, *_ = envs.step(np.full((17, 1), 0.005 * k - 1.0))
-            bits += [observations.tobytes(), rewards.tobytes()]
-        return bits
-
-    envs = batch(17, pressure_kpa="random", randomisation="varied")
-    first = episode(envs)
-    assert episode(envs) == first
-    other = batch(17, pressure_kpa="random", randomisation="varied", threads=2)
-    assert episode(other) == first
-    assert envs.reset(seed=5)[0].tobytes() != first[0]
-
-
 def test_without_a_seed_environments_and_episodes_differ(batch):
     def measured_by(envs):
         """What the sensors say in an episode's first steps, shape (8, 4, 40)."""
@@ -117,13 +94,3 @@ def test_what_is_returned_stays_as_it_was(batch):
         copies += [array.copy() for array in results]
     for array, copy in zip(kept, copies, strict=True):
         np.testing.assert_array_equal(array, copy)
-
-
-def test_closed_threads_come_back_when_they_are_needed(batch):
-    envs, serial = batch(40, threads=3), batch(40)
-    for one in (envs, serial):
-        one.reset(seed=0)
-    envs.close()
-    for _ in range(5):
-        results = [one.step(np.full((40, 1), -0.4)) for one in (envs, serial)]
-        np.testing.assert_array_equal(results[0][0], results[1][0])

@@ -7,7 +7,7 @@ import pytest
 pytest.importorskip("stable_baselines3")
 
 from gymnasium.wrappers import TimeLimit
-from stable_baselines3 import PPO, SAC
+from stable_baselines3 import PPO
 from stable_baselines3.common.evaluation import evaluate_policy
 from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.vec_env import (
@@ -23,18 +23,17 @@ from pma_gym.sb3 import SB3VecEnv
 MADE = {"model": "serres2008", "pressure_kpa": 300, "control_rate_hz": 10.0}
 
 
-@pytest.mark.parametrize("count", [1, 2, 17])
-@pytest.mark.parametrize("task", ["displacement", "rotation"])
-def test_a_batch_is_stable_baselines_own_loop(fragile, task, count):
-    made = MADE | {"model": fragile, "pressure_kpa": "random", "randomisation": "varied"}
+@pytest.mark.parametrize("count", [1, 3])
+def test_a_batch_is_stable_baselines_own_loop(fragile, count):
+    task, made = "displacement", MADE | {"model": fragile, "randomisation": "varied"}
     ours = SB3VecEnv(count, task, **made)
     theirs = DummyVecEnv([lambda: Monitor(PMAEnv(task, **made))] * count)
     for one in (ours, theirs):
         one.seed(7)
     generator, ends = np.random.default_rng(1), np.zeros(2, int)
     np.testing.assert_array_equal(ours.reset(), theirs.reset())
-    for k in range(330):
-        high = 1.0 if k % 250 < 60 else -0.9
+    for k in range(180):
+        high = 1.0 if k < 60 else -0.9
         actions = generator.uniform(-1.0, high, (count, 1)).astype(np.float32)
         *results, infos = ours.step(actions)
         *expected, their_infos = theirs.step(actions)
@@ -53,9 +52,7 @@ def test_a_batch_is_stable_baselines_own_loop(fragile, task, count):
             assert set(episode) == set(its) and episode["l"] == its["l"]
             assert episode["r"] == pytest.approx(its["r"], abs=1e-5)
             np.testing.assert_equal(info, other)
-    assert ends[0] > 0
-    if task == "displacement":
-        assert ends[1] > 0
+    assert np.all(ends > 0)
 
 
 def test_seeds_count_for_one_reset():
@@ -70,7 +67,7 @@ def test_seeds_count_for_one_reset():
 
 
 def test_options_count_for_one_reset():
-    envs = SB3VecEnv(3, **(MADE | {"noise": False}))
+    envs = SB3VecEnv(3, **MADE)
 
     def pressures() -> np.ndarray:
         envs.reset()
@@ -103,7 +100,7 @@ def test_infos_that_were_written_to_are_not_given_again():
 
 
 def test_attributes_are_those_of_each_environment():
-    envs = SB3VecEnv(3, pressures_kpa=[200, 300, 400], control_rate_hz=10.0, noise=False)
+    envs = SB3VecEnv(3, pressures_kpa=[200, 300, 400], control_rate_hz=10.0, model="serres2008")
     envs.reset()
     assert envs.get_attr("task") == [envs.envs.task] * 3
     assert envs.get_attr("pressure") == pytest.approx([2e5, 3e5, 4e5])
@@ -187,7 +184,7 @@ def test_rewards_are_evaluated_before_a_wrapper_normalises_them():
     returns = []
     for batch in (SB3VecEnv(4, **MADE), DummyVecEnv([lambda: Monitor(PMAEnv(**MADE))] * 4)):
         wrapped = VecNormalize(batch)
-        agent = PPO("MlpPolicy", wrapped, n_steps=64, seed=3, device="cpu").learn(256)
+        agent = PPO("MlpPolicy", wrapped, n_steps=64, seed=3, device="cpu")
         wrapped.seed(5)
         # Statistics of observations go on in an evaluation: the two need the same beginnings.
         returns.append(evaluate_policy(agent, wrapped, 4, return_episode_rewards=True)[0])
@@ -195,14 +192,10 @@ def test_rewards_are_evaluated_before_a_wrapper_normalises_them():
     assert np.mean(returns[0]) < -100.0
 
 
-@pytest.mark.parametrize("prefix", ["", "pma_gym:"])
-def test_a_registered_id_is_accepted(prefix):
-    envs = SB3VecEnv(2, f"{prefix}pma_gym/IsokineticRotation-v0", **MADE)
+def test_a_registered_id_is_accepted():
+    envs = SB3VecEnv(2, "pma_gym:pma_gym/IsokineticRotation-v0", **MADE)
     assert envs.envs.task.name == "rotation" and envs.observation_space.shape == (7,)
     assert envs.get_attr("spec")[1].id == "pma_gym/IsokineticRotation-v0"
-    assert SB3VecEnv(
-        2, f"{prefix}pma_gym/IsokineticRotation-v0", preview=3, **MADE
-    ).reset().shape == (2, 10)
 
 
 def test_an_id_of_ones_own_brings_its_options(monkeypatch):
@@ -252,31 +245,17 @@ def test_wrappers_of_stable_baselines(tmp_path):
 
 
 def test_ppo_learns_from_a_batch():
-    envs = SB3VecEnv(16, reward="gaussian", **MADE)
+    envs = SB3VecEnv(16, **MADE)
     agent = PPO("MlpPolicy", envs, n_steps=64, batch_size=256, n_epochs=2, seed=0, device="cpu")
-    agent.learn(3000)
-    # 192 steps; some may have broken a limit on the way.
-    assert 48 <= len(agent.ep_info_buffer or ()) < 100
+    agent.learn(1000)
+    # 64 steps of each; some may have broken a limit on the way.
+    assert 16 <= len(agent.ep_info_buffer or ()) < 100
     assert all(0 < episode["l"] <= 51 for episode in agent.ep_info_buffer or ())
-    again = SB3VecEnv(16, reward="gaussian", **MADE)
+    again = SB3VecEnv(16, **MADE)
     twin = PPO("MlpPolicy", again, n_steps=64, batch_size=256, n_epochs=2, seed=0, device="cpu")
-    twin.learn(3000)
+    twin.learn(1000)
     observations = envs.reset()
     np.testing.assert_array_equal(
         agent.predict(observations, deterministic=True)[0],
         twin.predict(observations, deterministic=True)[0],
     )
-    mean, _ = evaluate_policy(agent, envs, n_eval_episodes=16)
-    assert 0.0 < mean < 51.0
-
-
-def test_sac_fills_its_buffer_from_a_batch():
-    envs = SB3VecEnv(4, **MADE)
-    agent = SAC(
-        "MlpPolicy", envs, learning_starts=200, batch_size=64, buffer_size=2000, seed=0,
-        device="cpu",
-    )  # fmt: skip
-    agent.learn(500)
-    buffer = agent.replay_buffer
-    assert buffer is not None
-    assert buffer.timeouts[:125].sum() == 8 and np.all(buffer.dones[50] == 1.0)
