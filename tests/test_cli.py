@@ -99,7 +99,6 @@ def test_unknown_columns_are_said(run, tmp_path):
         (RAMP, ["--out", "nowhere/log.csv"], "there is no folder nowhere"),
         (RAMP, ["--out", "log.csv", "--model", "statoin"], "no model 'statoin'.*did you mean"),
         (RAMP, ["--out", "log.csv", "--interpolation", "cubic"], "'cubic' is not one of"),
-        (RAMP, ["--out", "log.csv", "--interpolation", "cubic"], "'cubic' is not one of"),
         (RAMP, ["--out", "log.csv", "--seed", "-1"], "--seed"),
         (RAMP, [], "Missing option '--out'"),
         ("", ["--out", "log.csv"], "ramp.csv is empty"),
