@@ -1,8 +1,11 @@
 """The pages that say how to add something work as they stand, and touch three or four files."""
 
+import pytest
+
 from tests.development.drill import copied, follow, run_pytest
 
 
+@pytest.mark.campaign
 def test_a_controller_is_three_files(tmp_path):
     copy = copied(
         tmp_path, "controllers", "pyproject.toml", "docs/reference/controllers.md",
@@ -20,6 +23,7 @@ def test_a_controller_is_three_files(tmp_path):
     assert "3 passed" in after.stdout
 
 
+@pytest.mark.campaign
 def test_an_effect_is_three_files(tmp_path):
     copy = copied(
         tmp_path, "pma_gym", "pyproject.toml", "tests/effects/conftest.py",
@@ -41,6 +45,7 @@ def test_a_task_is_three_files(tmp_path):
     assert int(done.stdout.split(" passed")[0].split()[-1]) >= 4
 
 
+@pytest.mark.campaign
 def test_a_rig_is_three_files(tmp_path):
     copy = copied(tmp_path, "pma_gym", "pyproject.toml")
     assert len(set(follow("add-a-rig.md", copy))) == 3
@@ -49,6 +54,7 @@ def test_a_rig_is_three_files(tmp_path):
     assert "3 passed" in done.stdout
 
 
+@pytest.mark.campaign
 def test_a_sensor_is_four_files(tmp_path):
     copy = copied(
         tmp_path, "pma_gym", "pyproject.toml", "tests/effects/conftest.py",
