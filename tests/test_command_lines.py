@@ -4,8 +4,6 @@ import json
 import math
 import os
 import shlex
-import subprocess
-import sys
 
 import numpy as np
 import pytest
@@ -203,15 +201,11 @@ def test_an_unknown_command_gets_the_nearest_one(run):
         ("pma-gym watch --contr", ["--controller"]),
     ],
 )
-def test_a_shell_completes_commands_options_models_and_tasks(words, wanted):
-    env = os.environ | {
-        "_PMA_GYM_COMPLETE": "complete_bash",
-        "COMP_WORDS": words,
-        "COMP_CWORD": str(len(words.split(" ")) - 1),
-    }
-    program = "from pma_gym.cli import main; main()"
-    done = subprocess.run([sys.executable, "-c", program], env=env, capture_output=True, text=True)
-    assert done.stdout.split() == wanted, done.stderr
+def test_a_shell_completes_commands_options_models_and_tasks(run, monkeypatch, words, wanted):
+    monkeypatch.setenv("_PMA_GYM_COMPLETE", "complete_bash")
+    monkeypatch.setenv("COMP_WORDS", words)
+    monkeypatch.setenv("COMP_CWORD", str(len(words.split(" ")) - 1))
+    assert run()[1].split() == wanted
 
 
 def test_info_is_json_for_programs(run):

@@ -79,13 +79,6 @@ def test_a_home_that_cannot_be_written_costs_one_word(tmp_path):
     assert error.count("UserWarning") == 1 and f"cannot write compiled plants to {home}" in error
 
 
-def test_a_home_that_cannot_be_written_is_not_asked_where_a_cache_is_named(tmp_path):
-    (tmp_path / "home").write_bytes(b"")
-    home, cache = str(tmp_path / "home"), str(tmp_path / "cache")
-    (kept,), error = run(CODE, tmp_path, HOME=home, PMA_GYM_CACHE=cache)
-    assert kept == cache and error == ""
-
-
 def test_without_any_folder_that_can_be_written_plants_compile_in_memory(tmp_path):
     code = "import tempfile\n" + (
         "def none(): raise FileNotFoundError(2, 'no usable temporary directory')\n"

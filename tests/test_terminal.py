@@ -51,9 +51,19 @@ def test_printed_text_is_safe_while_a_command_runs(capfd):
         assert r"\x1b[31mb" in text and "\x1b" not in text and r"\udcff" in text
 
 
+TWICE = """
+import sys
+from pma_gym.cli import main
+for path in sys.argv[1:]:
+    try:
+        main(["info", "--model", path])
+    except SystemExit as end:
+        code = end.code
+sys.exit(code)
+"""
+
 TERMINALS = {
     "ascii": {"PYTHONIOENCODING": "ascii:strict"},
-    "cp1252": {"PYTHONIOENCODING": "cp1252:strict"},
     "C": {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"},
 }
 
@@ -62,34 +72,36 @@ TERMINALS = {
 def test_any_terminal_and_any_file_name_serve(terminal, tmp_path):
     text = shipped_models()["serres2008"].read_text(encoding="utf-8")
     title = r"\u001b[31m[bold]圧力\u202e"
-    folder = os.fsencode(tmp_path)
-    path = os.path.join(folder, b"model-\xff.toml")
-    with open(path, "w", encoding="utf-8") as file:
-        file.write(text.replace('title = "', f'title = "{title} '))
-    command = [sys.executable, "-m", "pma_gym.cli", "info", "--model"]
-    run = {"capture_output": True, "env": os.environ | TERMINALS[terminal]}
-    done = subprocess.run([*command, path], **run)
-    assert done.returncode == 0 and not done.stderr
+    paths = [
+        os.path.join(os.fsencode(tmp_path), name) for name in (b"\xfe.toml", b"model-\xff.toml")
+    ]
+    texts = text.replace('title = "', f'title = "{title} '), "a = = 1"
+    for path, content in zip(paths, texts, strict=True):
+        with open(path, "w", encoding="utf-8") as file:
+            file.write(content)
+    done = subprocess.run(
+        [sys.executable, "-c", TWICE, *paths],
+        capture_output=True,
+        env=os.environ | TERMINALS[terminal],
+    )
     assert b"[bold]" in done.stdout and b"\x1b" not in done.stdout
     assert rb"\x1b[31m" in done.stdout
-    with open(path, "wb") as file:
-        file.write(b"a = = 1")
-    done = subprocess.run([*command, path], **run)
+    # Of the second file alone: the first is a model.
     assert done.returncode == 2 and done.stderr.startswith(b"error: ")
+    assert done.stderr.count(b"error: ") == 1
     assert b"Traceback" not in done.stderr and rb"model-\udcff.toml" in done.stderr
 
 
 NUMBERS = ["1_000", "٣", "３", "nan", "inf", "0x10", "1e400", "1.5"]
 
 
-@pytest.mark.parametrize("number", NUMBERS)
 @pytest.mark.parametrize(
-    ("command", "words"),
+    ("command", "words", "number"),
     [
-        (app, ["simulate", "in.csv", "--out", "out.csv", "--seed"]),
-        (app, ["diagnose", "folder", "--jobs"]),
-        (benchmarks, ["run", "--suite", "nominal", "--jobs"]),
-        (benchmarks, ["tune", "--seed"]),
+        *((benchmarks, ["tune", "--seed"], number) for number in NUMBERS),
+        (app, ["simulate", "in.csv", "--out", "out.csv", "--seed"], "1_000"),
+        (app, ["diagnose", "folder", "--jobs"], "1_000"),
+        (benchmarks, ["run", "--suite", "nominal", "--jobs"], "1_000"),
     ],
 )
 def test_options_read_numbers_strictly(command, words, number):

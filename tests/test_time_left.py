@@ -91,7 +91,7 @@ def test_a_step_that_outlasts_its_estimate_has_no_negative_rest(clock):
     assert left.words() == "less than a minute left"
 
 
-@pytest.mark.parametrize("search", [True, False])
+@pytest.mark.parametrize("search", [pytest.param(True, marks=pytest.mark.campaign), False])
 def test_every_step_of_a_run_is_known_beforehand(search):
     left, said = TimeLeft(DIAGNOSIS if search else FIT), []
 

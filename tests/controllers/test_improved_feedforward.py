@@ -14,7 +14,11 @@ from pma_gym.plant.plant import Plant
 from pma_gym.tasks import EVERY_TASK, TASKS
 
 FRICTIONLESS = {"coulomb_friction.static_n": 0.0, "coulomb_friction.dynamic_n": 0.0}
-TRIALS = [(task, p) for task in ("displacement", "rotation") for p in pressures(task)]
+TRIALS = [
+    (task, p)
+    for task in ("displacement", "rotation")
+    for p in pressures(task)[:: len(pressures(task)) - 1]
+]
 
 
 def voltages(station):
@@ -78,7 +82,7 @@ def test_voltage_does_not_chatter(station):
     assert np.ptp(hold) < 0.01
 
 
-@pytest.mark.parametrize("rate", [50.0, 100.0, 384.0])
+@pytest.mark.parametrize("rate", [50.0, 384.0])
 def test_any_control_rate(rate, drive):
     got, _ = drive(ImprovedFeedforward(), "displacement", 300, control_rate_hz=rate)
     assert got["displacement"] < 0.03

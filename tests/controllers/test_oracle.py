@@ -125,8 +125,11 @@ def test_it_must_be_shown_the_environment(station):
         Oracle().reset(lambda time: 0.0, station())
 
 
-@pytest.mark.parametrize("options", [{}, LATE, LATE | DISTURBED], ids=["100hz", "late", "hard"])
-@pytest.mark.parametrize(("task", "pressure"), [("displacement", 300), ("rotation", 400)])
+@pytest.mark.parametrize(
+    ("task", "pressure", "options"),
+    [("displacement", 300, {}), ("displacement", 300, LATE), ("rotation", 400, LATE | DISTURBED)],
+    ids=["100hz", "late", "hard"],
+)
 def test_it_beats_feedforward_and_feedback(task, pressure, options, drive):
     bound, _ = drive(Oracle(), task, pressure, **options)
     for rival in (ImprovedFeedforward(), FeedforwardPID()):

@@ -143,11 +143,6 @@ def test_a_loop_that_nothing_is_shipped_for_is_refused(written, station, tmp_pat
         ShippedPolicy("ppo", tmp_path / "nowhere").reset(lambda time: 0.0, station())
 
 
-@pytest.mark.parametrize("path", shipped_policies(), ids=lambda path: path.stem)
-def test_what_is_shipped_loads_and_has_its_own_name(path):
-    assert Policy(path).name == path.stem
-
-
 def test_torch_is_not_needed():
     code = (
         "import sys, controllers.policy; "

@@ -23,6 +23,7 @@ def test_a_controller_is_three_files(tmp_path):
     assert "3 passed" in after.stdout
 
 
+@pytest.mark.campaign
 def test_an_effect_is_three_files(tmp_path):
     copy = copied(
         tmp_path, "pma_gym", "pyproject.toml", "tests/effects/conftest.py",
@@ -44,6 +45,7 @@ def test_a_task_is_three_files(tmp_path):
     assert int(done.stdout.split(" passed")[0].split()[-1]) >= 4
 
 
+@pytest.mark.campaign
 def test_a_rig_is_three_files(tmp_path):
     copy = copied(tmp_path, "pma_gym", "pyproject.toml")
     assert len(set(follow("add-a-rig.md", copy))) == 3

@@ -33,7 +33,7 @@ from tests.fuzz.documents import (
     without,
 )
 
-EXAMPLES = int(os.environ.get("PMA_GYM_FUZZ_EXAMPLES", "30"))
+EXAMPLES = int(os.environ.get("PMA_GYM_FUZZ_EXAMPLES", "15"))
 
 fuzzed = settings(
     max_examples=EXAMPLES,
@@ -234,7 +234,7 @@ def _policies(_, document):
 
 
 READERS = {
-    "model": (_models, MODEL_TABLES[0], 6),
+    "model": (_models, MODEL_TABLES[0], 13),
     "dataset.toml": (_descriptions, DATASETS[0], 1),
     "suite": (_suites, min(SUITE_TABLES, key=lambda table: len(str(table))), 5),
     # Of its first environment, the one that is read.

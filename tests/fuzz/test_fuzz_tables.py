@@ -27,7 +27,7 @@ from pma_gym.data.files.trial_loading import load_tables
 from pma_gym.data.readers.table import FileFormat
 from pma_gym.data.trial import Trial, TrialError
 
-EXAMPLES = int(os.environ.get("PMA_GYM_FUZZ_EXAMPLES", "60"))
+EXAMPLES = int(os.environ.get("PMA_GYM_FUZZ_EXAMPLES", "25"))
 LONGEST_S = 20.0
 ROWS = 12
 

@@ -51,17 +51,8 @@ def run(tmp_path_factory, suite):
     """A small run."""
     folder = tmp_path_factory.mktemp("run")
     with (folder / "terminal.txt").open("w") as terminal:
-        code = run_job(suite, folder / "out", ThisProcess(), Console(file=terminal, width=120))
+        code = run_job(suite, folder / "out", ThisProcess(), SafeConsole(file=terminal, width=120))
     return code, folder / "out", (folder / "terminal.txt").read_text()
-
-
-def test_the_terminal_shows_words_and_no_markup(tmp_path, suite):
-    shown = tmp_path / "terminal.txt"
-    with shown.open("w") as terminal:
-        run_job(suite, tmp_path / "out", ThisProcess(), SafeConsole(file=terminal, width=120))
-    text = shown.read_text()
-    assert "failed" in text
-    assert "[/]" not in text
 
 
 @pytest.fixture
@@ -78,7 +69,9 @@ def rows(run):
 def test_a_failed_case_is_told_and_costs_the_exit_code(run, rows):
     code, _, terminal = run
     assert code == 1
-    assert "no such <pressure>" in terminal
+    assert "no such <pressure>" in terminal and "failed" in terminal
+    # Words and no markup.
+    assert "[/]" not in terminal
     failed = [row for row in rows if row["failure"]]
     assert [(row["controller"], row["pressure_kpa"]) for row in failed] == [("Half", "550")]
     assert failed[0]["rmse"] == ""

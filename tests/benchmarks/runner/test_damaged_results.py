@@ -33,6 +33,10 @@ RUBBISH = {
 }
 
 
+KINDS_OF_RUBBISH = ("half", "list", "types")
+"""No JSON, another kind of value, and an object of other values: one reader parses them all."""
+
+
 def order(folder):
     return Order(
         block=Block("nothing", trials=3, seconds=2.0), count=3, seed=4, folder=folder, judge=by_size
@@ -58,7 +62,7 @@ def warnings_in(text):
     return [line for line in text.splitlines() if line.startswith("warning: ")]
 
 
-@pytest.mark.parametrize("rubbish", RUBBISH)
+@pytest.mark.parametrize("rubbish", KINDS_OF_RUBBISH)
 def test_a_damaged_set_is_written_anew(folder, rubbish, capsys):
     (folder / "set.json").write_bytes(RUBBISH[rubbish])
     before = (folder / "cases/case_0001.json").stat().st_mtime_ns
@@ -75,7 +79,7 @@ def test_another_set_is_still_refused(folder):
         run_block(order(folder))
 
 
-@pytest.mark.parametrize("rubbish", RUBBISH)
+@pytest.mark.parametrize("rubbish", KINDS_OF_RUBBISH)
 def test_damaged_cases_are_made_anew_and_the_others_stay(folder, whole, rubbish, capsys):
     path, other = folder / "cases/case_0002.json", folder / "cases/case_0001.json"
     path.write_bytes(RUBBISH[rubbish])
@@ -89,7 +93,7 @@ def test_damaged_cases_are_made_anew_and_the_others_stay(folder, whole, rubbish,
 
 
 @pytest.mark.parametrize("key", ["truth", "answer", "rounds", "seconds", "number", "code"])
-@pytest.mark.parametrize("value", [3, [], "text", {"seed": 4}])
+@pytest.mark.parametrize("value", [3, {"seed": 4}])
 def test_a_record_of_another_form_is_made_anew(folder, key, value):
     path = folder / "cases/case_0003.json"
     record = json.loads(path.read_text())
@@ -123,7 +127,7 @@ def test_rows_of_another_schema_count_as_not_run(tmp_path, capsys):
     assert len(said) == 1 and "and 3 more" in said[0]
 
 
-@pytest.mark.parametrize("rubbish", RUBBISH)
+@pytest.mark.parametrize("rubbish", KINDS_OF_RUBBISH)
 def test_damaged_stages_are_made_anew(tmp_path, rubbish, capsys):
     stages = Stages(tmp_path, code="now")
     stages.keep("one", "asked", {"numbers": [1]})
@@ -131,7 +135,7 @@ def test_damaged_stages_are_made_anew(tmp_path, rubbish, capsys):
     (tmp_path / "one.json").write_bytes(RUBBISH[rubbish])
     assert stages.kept("one", "asked", lambda numbers: numbers) is None
     assert stages.others() == ""
-    assert len(warnings_in(capsys.readouterr().err)) == (rubbish not in ("object", "types", "NaN"))
+    assert len(warnings_in(capsys.readouterr().err)) == (rubbish != "types")
 
 
 def test_damaged_rows_of_gains_are_tuned_anew_and_the_others_stay(tmp_path, capsys):
