@@ -6,6 +6,7 @@ roundings of the law's text, with the exceptions that `folding` lists.
 """
 
 import struct
+from collections.abc import Mapping
 from typing import Any
 
 from pma_gym.codegen import elementary  # noqa: F401 - fills the functions of values
@@ -23,7 +24,17 @@ from pma_gym.codegen.folding import (
     simplify,
 )
 
-__all__ = ["CHANGING", "CONSTANT", "FIXED", "HELD", "Graph", "Kind", "Number", "Value"]
+__all__ = [
+    "CHANGING",
+    "CONSTANT",
+    "FIXED",
+    "HELD",
+    "Graph",
+    "Kind",
+    "Number",
+    "NumberGraph",
+    "Value",
+]
 
 _KINDS: dict[Kind, dict[str, Kind]] = {
     "real": {
@@ -162,6 +173,24 @@ class Graph(ValueGraph):
             _check_shift(operation, operands)
             return _KINDS[kinds[0]][operation]
         raise TypeError(f"no {operation} of {' and '.join(kinds)}")
+
+
+class NumberGraph(Graph):
+    """A graph whose inputs are numbers: what is traced in it is calculated at once.
+
+    A law that is traced in it gets constants; `Value.data` of each is its number.
+
+    Args:
+        numbers: number of every input, by name.
+    """
+
+    def __init__(self, numbers: Mapping[str, Number]) -> None:
+        super().__init__()
+        self.numbers = numbers
+
+    def input(self, name: str, level: int, kind: Kind = "real") -> Value:
+        """Return an input's number as a constant; the level has no meaning here."""
+        return self.constant(self.numbers[name], kind)
 
 
 def _check_shift(operation: str, operands: tuple[Value, ...]) -> None:
