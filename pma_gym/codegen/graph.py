@@ -21,6 +21,7 @@ from pma_gym.codegen.folding import (
     Number,
     Value,
     ValueGraph,
+    compute,
     simplify,
 )
 
@@ -190,7 +191,12 @@ class NumberGraph(Graph):
 
     def input(self, name: str, level: int, kind: Kind = "real") -> Value:
         """Return an input's number as a constant; the level has no meaning here."""
-        return self.constant(self.numbers[name], kind)
+        return self._new("constant", (), kind, CONSTANT, self.numbers[name])
+
+    def apply(self, operation: str, *operands: Value) -> Value:
+        """Calculate at once; equal numbers are values of their own, unlike in a `Graph`."""
+        number = compute(operation, operands[-1].kind, [operand.data for operand in operands])
+        return self._new("constant", (), self.kind_of(operation, operands), CONSTANT, number)
 
 
 def _check_shift(operation: str, operands: tuple[Value, ...]) -> None:

@@ -44,6 +44,8 @@ class PlainEngine(Engine):
         self, copy: Callable[[], Any], given: NDArray[np.float64], constants: Mapping[str, Any]
     ) -> Callable[[Any], Any]:
         """Return the step as a function; see `Engine.advance`. It reads no action but `given`."""
+        # Laws are traced here: in a step they are called with numbers only.
+        self._numbers(0)
 
         def made(action: object) -> Any:  # noqa: ANN401 - as `Engine.advance` has it
             if action is not given:
