@@ -6,6 +6,7 @@ roundings of the law's text, with the exceptions that `folding` lists.
 """
 
 import struct
+from collections.abc import Mapping
 from typing import Any
 
 from pma_gym.codegen import elementary  # noqa: F401 - fills the functions of values
@@ -20,10 +21,21 @@ from pma_gym.codegen.folding import (
     Number,
     Value,
     ValueGraph,
+    compute,
     simplify,
 )
 
-__all__ = ["CHANGING", "CONSTANT", "FIXED", "HELD", "Graph", "Kind", "Number", "Value"]
+__all__ = [
+    "CHANGING",
+    "CONSTANT",
+    "FIXED",
+    "HELD",
+    "Graph",
+    "Kind",
+    "Number",
+    "NumberGraph",
+    "Value",
+]
 
 _KINDS: dict[Kind, dict[str, Kind]] = {
     "real": {
@@ -162,6 +174,29 @@ class Graph(ValueGraph):
             _check_shift(operation, operands)
             return _KINDS[kinds[0]][operation]
         raise TypeError(f"no {operation} of {' and '.join(kinds)}")
+
+
+class NumberGraph(Graph):
+    """A graph whose inputs are numbers: what is traced in it is calculated at once.
+
+    A law that is traced in it gets constants; `Value.data` of each is its number.
+
+    Args:
+        numbers: number of every input, by name.
+    """
+
+    def __init__(self, numbers: Mapping[str, Number]) -> None:
+        super().__init__()
+        self.numbers = numbers
+
+    def input(self, name: str, level: int, kind: Kind = "real") -> Value:
+        """Return an input's number as a constant; the level has no meaning here."""
+        return self._new("constant", (), kind, CONSTANT, self.numbers[name])
+
+    def apply(self, operation: str, *operands: Value) -> Value:
+        """Calculate at once; equal numbers are values of their own, unlike in a `Graph`."""
+        number = compute(operation, operands[-1].kind, [operand.data for operand in operands])
+        return self._new("constant", (), self.kind_of(operation, operands), CONSTANT, number)
 
 
 def _check_shift(operation: str, operands: tuple[Value, ...]) -> None:

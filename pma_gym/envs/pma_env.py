@@ -14,6 +14,7 @@ from pma_gym.engine.cpu.step_writer import BAD_ACTION
 from pma_gym.engine.engine import Engine
 from pma_gym.engine.option_checks import Pressure, check_known, check_named, parse_pressure
 from pma_gym.engine.options import EnvironmentOptions, parse_options, parse_task
+from pma_gym.engine.plain_engine import PlainEngine
 from pma_gym.engine.snapshot import put, take
 from pma_gym.envs.batch import FunctionRewards, parse_seed
 from pma_gym.envs.copies import Copies
@@ -28,7 +29,7 @@ from pma_gym.envs.summary import last_info, no_scores, step_info
 from pma_gym.metrics import SAMPLE_RATE_HZ
 from pma_gym.tasks import Task, limit_in_words
 
-OWN = ("task", "render_mode", "render_width")
+OWN = ("task", "render_mode", "render_width", "compiled")
 """Keyword arguments of an environment in addition to the options."""
 
 RESET_OPTIONS = ("pressure_kpa",)
@@ -184,6 +185,8 @@ class PMAEnv(Copies, SeededByReset, Episode, gym.Env[NDArray[np.float32], NDArra
         render_mode: None; `rgb_array`: `render` returns a picture; or `human`: a window (pygame,
             extra `view`) shows `reset` and every step in real time, until the user closes it.
         render_width: width of the pictures (pixels), a multiple of 4; they are half as high.
+        compiled: whether compiled code makes the steps; with False plain Python makes them, about
+            ten a second, and a debugger stops at breakpoints in laws, sensors and rewards.
         options: keyword arguments, see `Options`.
 
     Attributes:
@@ -212,6 +215,7 @@ class PMAEnv(Copies, SeededByReset, Episode, gym.Env[NDArray[np.float32], NDArra
         task: str | Task = "displacement",
         render_mode: str | None = None,
         render_width: int = USUAL_WIDTH,
+        compiled: bool = True,
         **options: Unpack[EnvironmentOptions],
     ) -> None:
         """Check the options and compile the plant."""
@@ -221,7 +225,9 @@ class PMAEnv(Copies, SeededByReset, Episode, gym.Env[NDArray[np.float32], NDArra
         self.render_width = check_render_width(render_width)
         self.options = parse_options(options, "PMAEnv.__init__()", OWN)
         self.task = parse_task(task, self.options)
-        self._engine = Engine(self.task, self.options)
+        if not isinstance(compiled, bool):
+            raise ValueError(f"compiled must be true or false, got {compiled!r}")
+        self._engine = (Engine if compiled else PlainEngine)(self.task, self.options)
         self.observation_space = self._engine.table.space
         self._commands = CommandLine(self.options, self.task.actuator)
         self.action_space = self._commands.space

@@ -97,6 +97,7 @@ class Equations:
             matters here.
         interpolation: of the commands between rows: "foh" (first-order hold, linear in time) or
             "zoh" (zero-order hold).
+        graph: the graph to write into, a new one by default.
 
     Attributes:
         graph: the graph of all values.
@@ -115,9 +116,12 @@ class Equations:
     """
 
     def __init__(
-        self, parameters: Mapping[str, Parameters], interpolation: Interpolation = "zoh"
+        self,
+        parameters: Mapping[str, Parameters],
+        interpolation: Interpolation = "zoh",
+        graph: Graph | None = None,
     ) -> None:
-        self.graph = Graph()
+        self.graph = graph or Graph()
         self.parameters = {
             name: self.graph.inputs(name, values, FIXED) for name, values in parameters.items()
         }

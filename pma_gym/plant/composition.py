@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from pma_gym.codegen.generic import where
-from pma_gym.codegen.graph import CHANGING, Value
+from pma_gym.codegen.graph import CHANGING, Graph, Value
 from pma_gym.codegen.trace import trace
 from pma_gym.effects import Effect
 from pma_gym.effects.arithmetic import positive
@@ -28,6 +28,7 @@ class PlantEquations(Equations):
         effects: the model's effects by name.
         parameters: their parameters by effect; only their number matters here.
         interpolation: of the commands between rows: "foh" (linear in time) or "zoh" (held).
+        graph: the graph to write into, a new one by default.
 
     Attributes:
         effects: the model's effects by name.
@@ -38,8 +39,9 @@ class PlantEquations(Equations):
         effects: Mapping[str, Effect],
         parameters: Mapping[str, Parameters],
         interpolation: Interpolation = "zoh",
+        graph: Graph | None = None,
     ) -> None:
-        super().__init__(parameters, interpolation)
+        super().__init__(parameters, interpolation, graph)
         self.effects = dict(effects)
 
     def at(self, port: str) -> list[Effect]:

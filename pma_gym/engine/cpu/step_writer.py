@@ -262,7 +262,7 @@ class Writer(ResetWriter):
     ) -> None:
         """Take every sample that lies in the attempt."""
         options, task = self.state_layout.options, self.state_layout.task
-        one = sampling(self.eq, self.attempt, task, options.period)
+        one = sampling(self.eq.graph, self.attempt.left, task, options.period)
         graph = self.eq.graph
         known = {self.attempt.left.id: emitted[self.attempt.left.id]}
         for name, value in zip(COURSE, self.course.values, strict=True):

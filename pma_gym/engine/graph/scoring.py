@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from pma_gym.codegen.derivative import derivatives
-from pma_gym.codegen.graph import CHANGING, HELD, Value
+from pma_gym.codegen.graph import CHANGING, HELD, Graph, Value
 from pma_gym.codegen.trace import substitute
 from pma_gym.engine.observation import Prescribed
 from pma_gym.engine.state_layout import START, profile_at_offsets
@@ -107,17 +107,22 @@ class Sampling:
     ideal: Value | None = None
 
 
-def sampling(eq: Equations, attempt: StepAttempt, task: Task, period: float) -> Sampling:
+def sampling(graph: Graph, left: Value, task: Task, period: float) -> Sampling:
     """A sample in an attempt, from `course` and the record's numbers given as inputs.
 
     The quartic through both ends' positions and rates, and the first's second rate: its error goes
     with the fifth power of the step, as the integrator's own.
+
+    Args:
+        graph: the graph that it is to stand in.
+        left: time left of the control step where the attempt begins (s).
+        task: the task.
+        period: duration of the control step (s).
     """
-    graph = eq.graph
     c = Course(*(graph.input(f"course.{name}", CHANGING) for name in COURSE))
     sample, clock = graph.input("record.sample", CHANGING), graph.input("clock", HELD)
     length = graph.input("length", CHANGING)
-    done = period - attempt.left
+    done = period - left
     when = sample * SAMPLE_PERIOD - clock - done
     share = when * (1.0 / length)
     due = attempt_due(graph.input("accepted", CHANGING, "truth"), share)

@@ -10,7 +10,8 @@ slower. Compiled code uses fused multiply-add and another order of sums, so the 
 differ by a few units in the last place. The differences can grow over a long trial.
 """
 
-from collections.abc import Callable, Iterator
+import linecache
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from types import ModuleType
 
@@ -30,11 +31,13 @@ class Made:
 
     Attributes:
         proposed: proposed size (s).
-        left: remaining time of the span (s).
+        left: remaining time of the span before it (s).
         accepted: whether the error was within the tolerance.
         length: size of the attempt (s); time advances only if it is accepted.
         state: state vector after it (SI).
         size: proposed size of the next attempt (s).
+        next_left: remaining time of the span after it (s).
+        watched: what the plain plant watches.
     """
 
     proposed: float
@@ -43,6 +46,8 @@ class Made:
     length: float
     state: np.ndarray = field(repr=False)
     size: float
+    next_left: float
+    watched: tuple[float, ...] = ()
 
 
 class PlainPlant:
@@ -50,18 +55,21 @@ class PlainPlant:
 
     Args:
         plant: the compiled plant.
+        watched: values of the equations with a zero-order hold to compute in every attempt.
 
     Attributes:
         plant: the compiled plant.
         text: source of the module: functions `rates` and `attempt`, one operation per line.
         module: the module; replace its functions, or step into them with a debugger.
         arguments: names of each function's inputs, as in the equations.
+        parameters: the tolerance and the parameters, by name.
     """
 
-    def __init__(self, plant: Plant) -> None:
+    def __init__(self, plant: Plant, watched: Sequence[Value] = ()) -> None:
         self.plant = plant
         system, made = plant.program.zero_order_hold, plant.program.zero_order_hold.attempt
-        stepped = [*made.states, made.next_size, made.next_left, made.accepted, made.length]
+        stepped = [made.next_size, made.next_left, made.accepted, made.length]
+        stepped += [*made.states, *watched]
         functions = {"rates": plant.program.rates(), "attempt": stepped}
         inputs = {name: live_inputs(values) for name, values in functions.items()}
         self.arguments = {name: [i.data for i in values] for name, values in inputs.items()}
@@ -70,10 +78,12 @@ class PlainPlant:
             python_text(values, inputs[name], name) for name, values in functions.items()
         )
         self.module = ModuleType(f"plain_{plant.model.name}")
-        code = compile(self.text, f"<{self.module.__name__}>", "exec")
-        exec(code, self.module.__dict__)
+        file = f"<{self.module.__name__}>"
+        # A debugger shows the lines that it steps through from here.
+        linecache.cache[file] = len(self.text), None, self.text.splitlines(keepends=True), file
+        exec(compile(self.text, file, "exec"), self.module.__dict__)
         names = ["tolerance", *parameter_names(plant.model)]
-        self._fixed = dict(zip(names, map(float, plant.vector), strict=True))
+        self.parameters = dict(zip(names, map(float, plant.vector), strict=True))
 
     def derivative(
         self,
@@ -103,10 +113,23 @@ class PlainPlant:
             size: proposed size (s).
             left: remaining time (s).
         """
-        known = self._known(state, commands, zero_contraction) | {"size": size, "left": left}
-        *after, following, _, accepted, length = self._call("attempt", known)
-        after = np.array(after, float)
-        return Made(size, left, bool(accepted), float(length), after, float(following))
+        known = self._known(state, commands, zero_contraction)
+        return self.make(known | {"size": size, "left": left})
+
+    def make(self, known: Mapping[str, float]) -> Made:
+        """Make one step attempt from its inputs by name: `arguments["attempt"]`."""
+        size, left, accepted, length, *after = self._call("attempt", known)
+        state, watched = np.split(np.array(after, float), [len(self.states)])
+        return Made(
+            known["size"],
+            known["left"],
+            bool(accepted),
+            float(length),
+            state,
+            float(size),
+            float(left),
+            tuple(watched.tolist()),
+        )
 
     def attempts(
         self,
@@ -123,8 +146,8 @@ class PlainPlant:
             made = self.attempt(condition.state, voltages, zero, condition.size, left)
             condition.state[:], condition.size = made.state, made.size
             if made.accepted:
-                left -= made.length
                 condition.time += made.length
+            left = made.next_left
             yield made
 
     def step(
@@ -141,9 +164,9 @@ class PlainPlant:
         self, state: np.ndarray, commands: tuple[float, float], zero: float
     ) -> dict[str, float]:
         moving = dict(zip(self.states, map(float, state), strict=True))
-        return self._fixed | moving | dict(zip(COMMANDS, commands, strict=True)) | {ZERO: zero}
+        return self.parameters | moving | dict(zip(COMMANDS, commands, strict=True)) | {ZERO: zero}
 
-    def _call(self, name: str, known: dict[str, float]) -> tuple:
+    def _call(self, name: str, known: Mapping[str, float]) -> tuple:
         function: Callable[..., tuple] = getattr(self.module, name)
         # NumPy's numbers divide by zero as compiled code does: inf or NaN, where a float raises.
         with np.errstate(all="ignore"):
