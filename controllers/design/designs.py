@@ -154,9 +154,9 @@ def loop_name(station: StationInfo) -> str:
     return f"{1.0 / station.period:g}hz" + (f"_delay{delay:g}ms" if delay else "")
 
 
-def nearest_loop(wanted: str, known: list[str]) -> str:
+def nearest_loop(loop: str, known: list[str]) -> str:
     """The loop whose dead time, a period and the delay, is nearest as a ratio; the first of two."""
-    return min(known, key=lambda name: abs(math.log(_dead_time(name) / _dead_time(wanted))))
+    return min(known, key=lambda name: abs(math.log(_dead_time(name) / _dead_time(loop))))
 
 
 def _dead_time(loop: str) -> float:

@@ -74,10 +74,10 @@ class SpeedPID:
     def act(self, measurement: Measurement, time: float) -> float:
         """Regulator voltage (V)."""
         gains, due = self.gains, time + self._ahead
-        wanted = self._reference(due)
-        slow = (self._reference(due + self._period) - wanted) / self._period
+        target = self._reference(due)
+        slow = (self._reference(due + self._period) - target) / self._period
         slow -= self._speed.update(measurement)
-        behind = wanted - measurement.rotation
+        behind = target - measurement.rotation
         moment = gains.speed * slow + gains.angle * behind + self._sum
         local = self._device.at(measurement.pressure, measurement.rotation)
         pressure = self._first - moment / local.influence

@@ -78,13 +78,13 @@ class LinearMotion(NamedTuple):
 
 
 def linear_motion(
-    needed: np.ndarray, wanted: np.ndarray, station: StationInfo, beyond: int
+    needed: np.ndarray, target: np.ndarray, station: StationInfo, beyond: int
 ) -> LinearMotion:
     """The nominal motion under the feed-forward's voltages, and the plant near it.
 
     Args:
         needed: voltage that should be in force in every period of the trial (V), shape (trial,).
-        wanted: reference at the periods' ends (m or rad), shape (trial + 1,).
+        target: reference at the periods' ends (m or rad), shape (trial + 1,).
         station: nominal model, task, pressure, control period.
         beyond: periods after the trial's end for which the last voltage is held.
     """
@@ -103,7 +103,7 @@ def linear_motion(
     truth = plant.observe(states, zero)
     start = truth["contraction"][0]
     position = truth[task.schedule.quantity] - (start if task.load else 0.0)
-    error = np.append(position[: len(wanted)] - wanted, np.zeros(beyond))
+    error = np.append(position[: len(target)] - target, np.zeros(beyond))
     readings = plant.lagged(states, truth)
     readings[:, 0] = start - readings[:, 0]
     readings[:, 1] -= readings[0, 1]

@@ -177,8 +177,8 @@ def placed(a: np.ndarray, b: np.ndarray, pole: float) -> np.ndarray:
     """K such that all poles of A - b K are `pole`: Ackermann's formula, shape (n,)."""
     n = len(b)
     reached = np.stack([np.linalg.matrix_power(a, k) @ b for k in range(n)], axis=1)
-    wanted = np.linalg.matrix_power(a - pole * np.eye(n), n)
-    return np.linalg.solve(reached.T, np.eye(n)[n - 1]) @ wanted
+    polynomial = np.linalg.matrix_power(a - pole * np.eye(n), n)
+    return np.linalg.solve(reached.T, np.eye(n)[n - 1]) @ polynomial
 
 
 class ExtendedStateObserver:
@@ -313,7 +313,7 @@ class ObserverFeedback(ABC, Generic[Settings]):
         """Keep the motion, begin an observer and compute what the places need."""
 
     @abstractmethod
-    def _wanted(self, planned: float, z: np.ndarray) -> float:
+    def _unclipped_voltage(self, planned: float, z: np.ndarray) -> float:
         """Voltage (V), not held to limits, by that of the feed-forward (V) and z."""
 
     @abstractmethod
@@ -332,7 +332,7 @@ class ObserverFeedback(ABC, Generic[Settings]):
         """Voltage (V) of the task's actuator to hold for the next control period."""
         z = self._observer.update(measurement, time)
         planned = self._planned(time)
-        voltage = min(max(self._wanted(planned, z), 0.0), VOLTAGE_LIMIT)
+        voltage = min(max(self._unclipped_voltage(planned, z), 0.0), VOLTAGE_LIMIT)
         self._observer.send(voltage - planned)
         return voltage
 
