@@ -61,8 +61,10 @@ def exercise(
         if moment is not None and profile is not None:
             raise ChoiceError("--moment and --profile are two prescriptions; give one of them")
         choice = Choice(muscles, diameter, length, radius)
-        wanted = read_profile(profile) if profile else None if moment is None else held(moment)
-        run_exercise(choice, wanted, out, SafeConsole())
+        prescription = (
+            read_profile(profile) if profile else None if moment is None else held(moment)
+        )
+        run_exercise(choice, prescription, out, SafeConsole())
     except (ChoiceError, ProfileError, UnreachableError) as error:
         refuse(error)
 

@@ -94,13 +94,13 @@ COLUMNS = (
 
 
 def run_exercise(
-    choice: Choice, wanted: Prescription | None, out: Path, console: Console
+    choice: Choice, prescription: Prescription | None, out: Path, console: Console
 ) -> Answer | None:
     """Print the tables and write report, picture and figures.
 
     Args:
         choice: the configurations.
-        wanted: the prescription, or None.
+        prescription: the prescription, or None.
         out: folder for `report.html`, `report.md`, `moments.csv` and `plots/`.
         console: where to print.
     Returns:
@@ -111,7 +111,7 @@ def run_exercise(
     """
     model = load_model(MODEL)
     shown = choice.shown(model)
-    smallest = answer(model, choice.searched(model), wanted) if wanted else None
+    smallest = answer(model, choice.searched(model), prescription) if prescription else None
     devices = sorted({*shown, smallest.device}) if smallest else shown
     blocks = exercise_blocks(model, devices, smallest)
     for block in blocks:

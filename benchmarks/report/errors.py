@@ -200,8 +200,8 @@ class SuiteRecord:
 
     def done(self, entry: Entry) -> tuple[int, int]:
         """Count a controller's cases with a row, and all of its cases."""
-        wanted = [e for e in self.suite.episodes if entry.does(e.task)]
-        return sum((entry.spec.name, e) in self.rows for e in wanted), len(wanted)
+        planned = [e for e in self.suite.episodes if entry.does(e.task)]
+        return sum((entry.spec.name, e) in self.rows for e in planned), len(planned)
 
     def whole(self, tasks: tuple[str, ...]) -> list[Entry]:
         """Controllers that have a row for every episode of these tasks."""

@@ -173,13 +173,13 @@ def _bars(
     progress: Progress, todo: PendingCases, entries: Sequence[Entry]
 ) -> Callable[[Row], None]:
     """A bar for each controller and one for all, which rows move on."""
-    wanted = Counter(case.spec.name for case in todo.cases)
+    counts = Counter(case.spec.name for case in todo.cases)
     done = Counter(name for name, _ in todo.known)
     failures = Counter[str]()
     bars = {
         entry.spec.name: progress.add_task(
             entry.spec.label,
-            total=wanted[entry.spec.name],
+            total=counts[entry.spec.name],
             completed=done[entry.spec.name],
             failed="",
         )

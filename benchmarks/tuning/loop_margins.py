@@ -86,10 +86,10 @@ def _contracted(
     def contraction(voltage: float) -> float:
         return float(plant.settle(motor, regulator_voltage=voltage).state[at])
 
-    wanted = contraction(first) + share * station.task.schedule.span
+    target = contraction(first) + share * station.task.schedule.span
 
     def off(voltage: float) -> float:
-        return contraction(voltage) - wanted
+        return contraction(voltage) - target
 
     voltage = float(root_scalar(off, method="brentq", bracket=(first, 10.0), xtol=1e-9).root)
     return plant.settle(motor, regulator_voltage=voltage), (motor, voltage)

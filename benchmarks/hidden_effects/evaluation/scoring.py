@@ -184,12 +184,12 @@ def _by_effect(some: Sequence[Outcome]) -> dict[str, Any]:
 
 def _gap_closed(name: str, some: Sequence[Outcome]) -> dict[str, Any]:
     closed = [share for outcome in some for share in outcome.closed]
-    wanted = name in GAP_BLOCKS
+    has_limit = name in GAP_BLOCKS
     middle = float(np.median(closed)) if closed else None
     tenth = float(np.percentile(closed, 10)) if closed else None
     return {
-        "median": _amount(middle, GAP_MEDIAN if wanted else None),
-        "tenth_percentile": _amount(tenth, GAP_TENTH if wanted else None),
+        "median": _amount(middle, GAP_MEDIAN if has_limit else None),
+        "tenth_percentile": _amount(tenth, GAP_TENTH if has_limit else None),
         "n": len(closed),
     }
 

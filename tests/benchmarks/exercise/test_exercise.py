@@ -96,9 +96,9 @@ def test_a_short_muscle_serves_a_profile_that_ends_early(tmp_path):
     )
     assert answer.device.muscles == muscles(1, 20, 150)
     device, given = answer.device, answer.setting
-    angle, model = answer.wanted.angle, load_model("station")
+    angle, model = answer.prescription.angle, load_model("station")
     held_there = resistive_moment(model, device, given.pressure, angle, given.rest_pressure)
-    assert held_there.moment == pytest.approx(answer.wanted.moment, rel=0.01)
+    assert held_there.moment == pytest.approx(answer.prescription.moment, rel=0.01)
 
 
 def test_a_given_size_narrows_the_choice(tmp_path):
