@@ -26,7 +26,7 @@ from pma_gym.engine.option_checks import (
 from pma_gym.engine.options import EnvironmentOptions, parse_options, parse_task
 from pma_gym.engine.snapshot import put, take
 from pma_gym.engine.state_layout import PARTS
-from pma_gym.envs.batch import BatchActions, FunctionRewards, all_seeds, masked, wanted_pressures
+from pma_gym.envs.batch import BatchActions, FunctionRewards, all_seeds, masked, requested_pressures
 from pma_gym.envs.copies import Copies
 from pma_gym.envs.member import BatchMember
 from pma_gym.envs.rendering.history import RecordingEngine
@@ -178,12 +178,14 @@ class PMAVectorEnv(
             if "reset_mask" in requested
             else self._all
         )
-        wanted = wanted_pressures(requested, indices, self.num_envs, self.engine.nominal_model)
+        pressures = requested_pressures(
+            requested, indices, self.num_envs, self.engine.nominal_model
+        )
         seeds = self._own_seeds(all_seeds(self._or_drawn(seed), self.num_envs), indices)
         # Should it fail on the way, these have no episode.
         self._begun[indices], self._idle = False, True
         self.engine.seed(indices, seeds)
-        self.engine.reset(indices, wanted)
+        self.engine.reset(indices, pressures)
         self._begun[indices], self._ended[indices] = True, False
         self._idle = not self._begun.all()
         self._waiting = np.flatnonzero(self._ended) if self._ended.any() else None
@@ -398,9 +400,9 @@ class PMAVectorEnv(
         """Gauge pressure at the start of every episode (Pa), shape (num_envs,)."""
         return self.engine.pressures.copy()
 
-    def set_pressures(self, wanted: Mapping[int, Pressure]) -> None:
+    def set_pressures(self, pressures: Mapping[int, Pressure]) -> None:
         """Begin later episodes at other pressures (kPa), by the index of the environment."""
-        self.engine.set_pressures(wanted)
+        self.engine.set_pressures(pressures)
         # States are of environments with the same pressures.
         self._setup_of = None, ()
 
