@@ -300,11 +300,11 @@ class Oracle:
 
         def predicted(plans: NDArray[np.float64]) -> NDArray[np.float64]:
             volts[: len(plans), delay:] = plans
-            held = volts[: len(plans), ahead.periods]
+            by_period = volts[: len(plans), ahead.periods]
             if self._regulates:
-                commands = Commands(motor, (held + jump).clip(0.0, VOLTAGE_LIMIT))
+                commands = Commands(motor, (by_period + jump).clip(0.0, VOLTAGE_LIMIT))
             else:
-                commands = Commands(held, regulator)
+                commands = Commands(by_period, regulator)
             # A copy: the next prediction is written over it.
             return self._prediction(condition, commands, len(plans))[self._quantity].copy()
 

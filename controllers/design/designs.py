@@ -238,9 +238,9 @@ class Gains(NamedTuple):
         at the end of phase III, every push that noise makes stays, for the drive cannot push
         back and nothing else does. k_p and k_d pass noise on from sample to sample.
         """
-        held = min(max(share, 0.0), 1.0)
-        end = 1.0 + (self.end_factor - 1.0) * held * held
-        start = 1.0 + (self.start_factor - 1.0) * max(0.0, 1.0 - held / START_SHARE)
+        clipped = min(max(share, 0.0), 1.0)
+        end = 1.0 + (self.end_factor - 1.0) * clipped * clipped
+        start = 1.0 + (self.start_factor - 1.0) * max(0.0, 1.0 - clipped / START_SHARE)
         return self._replace(
             proportional=end * start * self.proportional,
             integral=end * math.sqrt(start) * self.integral,

@@ -81,7 +81,7 @@ class SpeedPID:
         moment = gains.speed * slow + gains.angle * behind + self._sum
         local = self._device.at(measurement.pressure, measurement.rotation)
         pressure = self._first - moment / local.influence
-        if not self._arrival.held(measurement.pressure, -behind):
+        if not self._arrival.is_saturated(measurement.pressure, -behind):
             self._sum += gains.sum * self._period * behind
         self._arrival.command(pressure)
         return self._volts(pressure)

@@ -263,8 +263,10 @@ class StationInverse:
             pull = muscle.tension(0.5 * (target + start), (target - start) / step)
             if pull < 0.0:
                 # The cable cannot push: it hangs loose, and the muscle goes back as it does alone.
-                held = muscle.tension(start, 0.0)
-                target = start + (target - start) * max(held, 0.0) / (max(held, 0.0) - pull)
+                start_tension = muscle.tension(start, 0.0)
+                target = start + (target - start) * max(start_tension, 0.0) / (
+                    max(start_tension, 0.0) - pull
+                )
             muscle.remember(0.5 * (target + start), (target - start) / step, step)
             tension[i], extension[i + 1] = pull, target
         return tension, extension

@@ -92,10 +92,10 @@ def linear_motion(
     moved_by_motor = task.actuator == "motor"
     idle = _idle_voltage(station) if moved_by_motor else 0.0
     volts = np.clip(np.append(needed, np.full(beyond, needed[-1])), idle, VOLTAGE_LIMIT)
-    held = motor_at_rest(station.model, task), plant.regulator_voltage(station.pressure)
-    motor, regulator = (np.full(len(volts), voltage) for voltage in held)
+    rest_voltages = motor_at_rest(station.model, task), plant.regulator_voltage(station.pressure)
+    motor, regulator = (np.full(len(volts), voltage) for voltage in rest_voltages)
     commands = (volts, regulator) if moved_by_motor else (motor, volts)
-    rest = plant.settle(held[0], regulator_voltage=held[1])
+    rest = plant.settle(rest_voltages[0], regulator_voltage=rest_voltages[1])
     times = station.period * np.arange(len(volts) + 1)
     states, zero = plant.run(
         times, *(np.append(one, one[-1]) for one in commands), interpolation="zoh", condition=rest

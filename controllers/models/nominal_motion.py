@@ -70,8 +70,8 @@ def _way(start: float, end: float, step: float, stroke: Stroke, slowest: float) 
     up, way = end > start, [start]
     while (way[-1] < end) == up:
         at = stroke.nearest(way[-1])
-        local, held = stroke.models[at], stroke.volts[at]
-        left = VOLTAGE_LIMIT - held if up else held
+        local, volts = stroke.models[at], stroke.volts[at]
+        left = VOLTAGE_LIMIT - volts if up else volts
         speed = max(DRIVEN_SHARE * local.gain / local.time_constant * left, slowest)
         way.append(way[-1] + (speed if up else -speed) * step)
     way[-1] = end
@@ -103,12 +103,14 @@ def nominal_rollout(station: StationInfo, volts: np.ndarray) -> np.ndarray:
     """
     plant, (motor, regulator) = Plant(station.model), rest_voltages(station)
     moves_regulator = station.task.actuator == "regulator"
-    held = np.clip(np.append(volts, volts[-1]), 0.0, VOLTAGE_LIMIT)
-    held[: round(station.action_delay / station.period)] = regulator if moves_regulator else motor
-    other = np.full(len(held), motor if moves_regulator else regulator)
-    commands = (other, held) if moves_regulator else (held, other)
+    commanded = np.clip(np.append(volts, volts[-1]), 0.0, VOLTAGE_LIMIT)
+    commanded[: round(station.action_delay / station.period)] = (
+        regulator if moves_regulator else motor
+    )
+    other = np.full(len(commanded), motor if moves_regulator else regulator)
+    commands = (other, commanded) if moves_regulator else (commanded, other)
     start = plant.settle(motor, regulator_voltage=regulator)
-    times = station.period * np.arange(len(held))
+    times = station.period * np.arange(len(commanded))
     states, zero = plant.run(times, *commands, interpolation="zoh", condition=start)
     said = plant.lagged(states, plant.observe(states, zero))
     measured = said[:, [plant.outputs.index(n) for n in ("contraction", "rotation", "load")]].T
