@@ -138,9 +138,13 @@ class Remake:
 
     def left(self) -> list[Step]:
         """Steps that are not done, or whose grounds have changed since."""
-        return [step for step in self.steps if self._begun(step, step.digest) < len(step.commands)]
+        return [
+            step
+            for step in self.steps
+            if self._commands_done(step, step.digest) < len(step.commands)
+        ]
 
-    def _begun(self, step: Step, grounds: str) -> int:
+    def _commands_done(self, step: Step, grounds: str) -> int:
         """How many of a step's commands have ended well on these grounds."""
         kept = self.done.get(step.name, {})
         return int(kept["commands"]) if kept.get("grounds") == grounds else 0
@@ -155,18 +159,18 @@ class Remake:
         for number, step in enumerate(self.steps, 1):
             # Asked anew at each: the steps before may have changed what it is made of.
             grounds = step.digest
-            begun = self._begun(step, grounds)
-            said = "done before" if begun == len(step.commands) else step.makes
+            done_before = self._commands_done(step, grounds)
+            said = "done before" if done_before == len(step.commands) else step.makes
             self._say(f"{number}/{len(self.steps)} {step.name}: {said}")
-            if not self._made(step, grounds, begun):
+            if not self._made(step, grounds, done_before):
                 self.table()
                 return False
         self.table()
         return True
 
-    def _made(self, step: Step, grounds: str, begun: int) -> bool:
+    def _made(self, step: Step, grounds: str, done_before: int) -> bool:
         """Run a step's commands from a number on; whether all ended well."""
-        for done, words in enumerate(step.commands[begun:], begun + 1):
+        for done, words in enumerate(step.commands[done_before:], done_before + 1):
             code = self.run(words)
             if code:
                 said = " ".join(("python", *words))

@@ -51,7 +51,7 @@ def exercise(
     """Show which moments muscles of which size give, and the smallest for a prescription."""
     from benchmarks.exercise.choice import Choice, ChoiceError
     from benchmarks.exercise.choose_device import run_exercise
-    from benchmarks.exercise.profile import ProfileError, held, read_profile
+    from benchmarks.exercise.profile import ProfileError, constant_prescription, read_profile
     from pma_gym.plant.exercise_device.prescription import UnreachableError
     from pma_gym.terminal import SafeConsole
 
@@ -62,7 +62,11 @@ def exercise(
             raise ChoiceError("--moment and --profile are two prescriptions; give one of them")
         choice = Choice(muscles, diameter, length, radius)
         prescription = (
-            read_profile(profile) if profile else None if moment is None else held(moment)
+            read_profile(profile)
+            if profile
+            else None
+            if moment is None
+            else constant_prescription(moment)
         )
         run_exercise(choice, prescription, out, SafeConsole())
     except (ChoiceError, ProfileError, UnreachableError) as error:

@@ -40,7 +40,7 @@ class Prescription(NamedTuple):
     scheduled: bool
 
 
-def held(moment: float) -> Prescription:
+def constant_prescription(moment: float) -> Prescription:
     """A moment (N m) that one pressure holds at 90 deg.
 
     Raises:
@@ -147,8 +147,8 @@ class Answer(NamedTuple):
 def _pressures(prescription: Prescription, setting: Held | Schedule) -> str:
     if isinstance(setting, Held):
         return (
-            f"{prescription.moment[0]:g} N m at 90 deg is held at {1e-3 * setting.pressure:.0f} kPa, "
-            "the cable set at that pressure."
+            f"{prescription.moment[0]:g} N m at 90 deg is held at "
+            f"{1e-3 * setting.pressure:.0f} kPa, the cable set at that pressure."
         )
     degrees = prescription.angle / SI_FACTORS["deg"]
     shown = np.unique(np.linspace(0, len(degrees) - 1, 7).round().astype(int))

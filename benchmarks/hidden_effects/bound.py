@@ -150,8 +150,8 @@ def noiseless(
     readings = plain.whitened_residuals(fit.model).readings(fit.values)
     assert readings is not None
     changed = [
-        _read(trial, held.T + after - before)
-        for trial, held, before, after in zip(trials, readings, base, with_it, strict=True)
+        _read(trial, readings_of.T + after - before)
+        for trial, readings_of, before, after in zip(trials, readings, base, with_it, strict=True)
     ]
     return FitProblem(changed, fit.model, free_parameters(fit.model), noise), fit.model
 
@@ -191,8 +191,8 @@ def distances(
         *(each for each in scores if each.candidate.name == name and each.starts),
     ]:
         whitened = problem.probed(refitted.model, each.candidate)
-        begun = starting_points(baseline, whitened, each)[0]
-        fit = problem.fit(refitted.model, (each.candidate,), {each.candidate.name: begun})
+        start = starting_points(baseline, whitened, each)[0]
+        fit = problem.fit(refitted.model, (each.candidate,), {each.candidate.name: start})
         if fit is not None:
             left = left_by(problem, fit, (each.candidate,))
             by_rival[each.candidate.name] = min(by_rival[each.candidate.name], left)
@@ -274,12 +274,12 @@ def main(
     kept.mkdir(exist_ok=True)
     names = [path.stem for path in sorted((cases / "truth").glob("case_*.json")) if _counts(path)]
     missing = [name for name in names if not _is_kept(kept / f"{name}.json")]
-    begun = time.monotonic()
+    start = time.monotonic()
     print(f"{len(names) - len(missing)} of {len(names)} cases are bounded", file=sys.stderr)
     done = itertools.count(1)
 
     def tell(_: int, name: str) -> None:
-        took = time.monotonic() - begun
+        took = time.monotonic() - start
         print(f"{next(done)}/{len(missing)}  {name}  ({took:.0f} s)", file=sys.stderr, flush=True)
 
     run_or_raise([partial(_bound_one, cases, name) for name in missing], local(jobs), tell)

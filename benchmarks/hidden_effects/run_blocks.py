@@ -206,14 +206,14 @@ class Progress:
 
     def __init__(self, order: Order, known: Sequence[Outcome]) -> None:
         self.order, self.outcomes = order, list(known)
-        self.begun, self.before = time.monotonic(), len(known)
+        self.start, self.before = time.monotonic(), len(known)
 
     def tell(self, record: CaseRecord) -> None:
         """One more case is done."""
         outcome = scoring.outcome_of(record)
         self.outcomes.append(outcome)
         done, count = len(self.outcomes), self.order.count
-        left = (time.monotonic() - self.begun) / (done - self.before) * (count - done)
+        left = (time.monotonic() - self.start) / (done - self.before) * (count - done)
         size = "" if outcome.ratio is None else f" (r {outcome.ratio:.2f})"
         answer = outcome.said if outcome.answered else f"NO ANSWER, {outcome.sentence}"
         first = RATES[self.order.block.name][0]

@@ -135,9 +135,9 @@ def _chosen(chooser: str, case: Case, answer: Answer, rounds: int, judge: Judge)
         elif answer.document is not None:
             words = answer.document["next_experiment"]["excitation"]
         case = with_trial(case, volts, g)
-        begun = time.perf_counter()
+        start = time.perf_counter()
         answer = asked(case, case.truth["number"], judge)
-        done.append(_round(case, answer, words) | {"seconds": time.perf_counter() - begun})
+        done.append(_round(case, answer, words) | {"seconds": time.perf_counter() - start})
     return done
 
 
@@ -187,7 +187,7 @@ class Work:
 
     def __call__(self) -> records.CaseRecord:
         """Do it."""
-        begun = time.perf_counter()
+        start = time.perf_counter()
         case = self.block.draw(self.seed, self.number)
         drawn = time.perf_counter()
         kept = self.folder / "data" if self.keep else None
@@ -200,7 +200,7 @@ class Work:
             # Here, for it compiles the package's library of experiments.
 
             rounds = follow(case, answer, self.block.rounds, self.judge)
-        ends = {"draw": drawn - begun, "diagnose": answered - drawn}
+        ends = {"draw": drawn - start, "diagnose": answered - drawn}
         ends["rounds"] = time.perf_counter() - answered
         return records.CaseRecord(
             self.number,

@@ -212,7 +212,7 @@ def _sizes(some: Sequence[Outcome]) -> dict[str, Any]:
             errors.setdefault(path, []).append(error)
             covered.setdefault(path, []).append(outcome.covered[path])
     every = [error for each in errors.values() for error in each]
-    inside = [held for each in covered.values() for held in each]
+    inside = [covers for each in covered.values() for covers in each]
     return {
         "median_error": _amount(float(np.median(every)) if every else None, SIZE_ERROR),
         "covered": rate(inside, COVERAGE),
