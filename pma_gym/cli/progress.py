@@ -72,7 +72,7 @@ class TimeLeft:
         self._clock = clock
         self._took: dict[str, float] = {}
         self._step = ""
-        self._begun = 0.0
+        self._step_start = 0.0
         self._done, self._total = 0, 0
 
     def __call__(self, step: str, done: int, total: int) -> None:
@@ -80,8 +80,8 @@ class TimeLeft:
         now = self._clock()
         if step != self._step:
             if self._step:
-                self._took[_kind(self._step)] = now - self._begun
-            self._step, self._begun = step, now
+                self._took[_kind(self._step)] = now - self._step_start
+            self._step, self._step_start = step, now
         self._done, self._total = done, total
 
     def seconds(self) -> tuple[float, float] | None:
@@ -108,7 +108,7 @@ class TimeLeft:
 
     def _rest(self, kind: str) -> float:
         """Seconds that are left of the step that runs: by its pace, once it has one."""
-        so_far = self._clock() - self._begun
+        so_far = self._clock() - self._step_start
         if 0 < self._done < self._total:
             return so_far / self._done * (self._total - self._done)
         return max(self._expected(kind) - so_far, 0.0)

@@ -73,7 +73,7 @@ class Correction(NamedTuple):
 
 def meet(
     states: Sequence[Array],
-    held: Sequence[Sequence[Array]],
+    readings: Sequence[Sequence[Array]],
     trials: Sequence[Logged],
     levels: Array,
     further: int,
@@ -83,15 +83,15 @@ def meet(
     Args:
         states: of all simulations of each trial, the last of which are the first with another start
             each, shape (tried + further, rows, states); the others are changed in place.
-        held: what the sensors hold in them (SI), shape (tried + further, rows) each, by trial and
-            signal.
+        readings: what the sensors hold in them (SI), shape (tried + further, rows) each, by
+            trial and signal.
         trials: what was measured.
         levels: standard deviations of the signals (SI), shape (signals,).
         further: how many other starts there are.
     """
     sought = [
         _Sought.of(signals, logged, levels, further)
-        for signals, logged in zip(held, trials, strict=True)
+        for signals, logged in zip(readings, trials, strict=True)
     ]
     known = [each for each in sought if np.isfinite(each.sizes).all() and each.sizes.any()]
     # What one start does as well as the other is shared between them.
@@ -120,13 +120,15 @@ class _Sought(NamedTuple):
     sizes: Array
 
     @classmethod
-    def of(cls, held: Sequence[Array], logged: Logged, levels: Array, further: int) -> "_Sought":
+    def of(
+        cls, readings: Sequence[Array], logged: Logged, levels: Array, further: int
+    ) -> "_Sought":
         along, off = [], []
         for channel in logged.channels:
             there = logged.there[channel]
             # One signal has no weight beside another.
             weight = levels[logged.channels[0]] / levels[channel]
-            read = held[channel][:, there]
+            read = readings[channel][:, there]
             change = weight * (read[-further:] - read[0])
             if logged.signals[channel].has_free_zero:
                 change = change - change.mean(axis=1, keepdims=True)

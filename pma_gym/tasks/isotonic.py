@@ -178,11 +178,11 @@ class _Balance:
         rotor, cable, drive = (self.parameters[n] for n in ("rotor", "cable", "drive"))
         rest = self.plant.settle(0.0, pressure=self.pressure).zero_contraction
         wound = rotor.radius * self.target if self.rotates else self.target
-        pull = self._force(rest - wound, self._held)
+        pull = self._force(rest - wound, self._pressures)
         # The cable gives way by a few hundredths of the extension: four rounds are plenty.
         for _ in range(4 if self.rotates else 0):
             stretch = cable.slack + np.maximum(pull, 0.0) / cable.stiffness
-            pull = self._force(rest - np.maximum(wound - stretch, 0.0), self._held)
+            pull = self._force(rest - np.maximum(wound - stretch, 0.0), self._pressures)
         if np.any(pull < -ROUNDING_N):
             return f"the cable would have to push {_when(pull < -ROUNDING_N)}"
         return _beyond("motor", (pull - drive.offset) / drive.gain)
@@ -202,7 +202,7 @@ class _Balance:
         return _beyond("regulator", (0.5 * (low + high) - line.offset) / line.gain)
 
     @property
-    def _held(self) -> NDArray[np.float64]:
+    def _pressures(self) -> NDArray[np.float64]:
         return np.full(len(self.target), self.pressure)
 
     def _force(self, x: NDArray[np.float64], pressure: NDArray[np.float64]) -> NDArray[np.float64]:

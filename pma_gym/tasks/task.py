@@ -197,9 +197,9 @@ def phase_rmse(schedule: TrialSchedule, position: NDArray[np.float64]) -> dict[s
     Returns:
         RMSE (m or rad) by phase name, and `all`: over the samples of all phases.
     """
-    begun = {name: e for name, e in phase_errors(schedule, position).items() if len(e)}
-    known = {name: rmse(error) for name, error in begun.items()}
-    return known | {"all": rmse(np.concatenate(list(begun.values())))}
+    started = {name: e for name, e in phase_errors(schedule, position).items() if len(e)}
+    known = {name: rmse(error) for name, error in started.items()}
+    return known | {"all": rmse(np.concatenate(list(started.values())))}
 
 
 LIMITS: tuple[tuple[str, str, float], ...] = (

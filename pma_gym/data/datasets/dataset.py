@@ -155,8 +155,8 @@ def _named(
         trial, description.sensors, lambda words: doubts.append((path.name, words))
     )
     about = {**description.trials.get(path.name, {})}
-    begun = about.pop("memory_at_start", None)
-    return NamedTrial(path.name, replace(trial, memory_at_start=begun), **about)
+    memory_at_start = about.pop("memory_at_start", None)
+    return NamedTrial(path.name, replace(trial, memory_at_start=memory_at_start), **about)
 
 
 def _outliers(trial: Trial, table: Table) -> Iterator[str]:
