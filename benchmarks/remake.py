@@ -108,9 +108,9 @@ Run = Callable[[Sequence[str]], int]
 """Runs a command and gives its exit code."""
 
 
-def run_command(words: Sequence[str]) -> int:
+def run_command(arguments: Sequence[str]) -> int:
     """Run a command of this project; its exit code. Ctrl-C reaches it, and this job after it."""
-    return subprocess.run(command_line(words), cwd=ROOT, check=False).returncode
+    return subprocess.run(command_line(arguments), cwd=ROOT, check=False).returncode
 
 
 class Remake:
@@ -170,10 +170,10 @@ class Remake:
 
     def _made(self, step: Step, grounds: str, done_before: int) -> bool:
         """Run a step's commands from a number on; whether all ended well."""
-        for done, words in enumerate(step.commands[done_before:], done_before + 1):
-            code = self.run(words)
+        for done, arguments in enumerate(step.commands[done_before:], done_before + 1):
+            code = self.run(arguments)
             if code:
-                said = " ".join(("python", *words))
+                said = " ".join(("python", *arguments))
                 self._say(f"{step.name} ended with {code}: {said}; run it again to go on")
                 return False
             self.done[step.name] = {"grounds": grounds, "commands": done}
@@ -190,8 +190,8 @@ class Remake:
         lines = ["\t".join(row) for row in (("figure", "old", "new", "change"), *rows)]
         write_text(self.folder / TABLE, "\n".join(lines) + "\n")
 
-    def _say(self, words: str) -> None:
-        self.console.print(words, highlight=False, markup=False)
+    def _say(self, message: str) -> None:
+        self.console.print(message, highlight=False, markup=False)
 
 
 def _read(path: Path) -> dict:

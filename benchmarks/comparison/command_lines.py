@@ -34,5 +34,5 @@ def _folder(option: str, suite: FrozenSuite, folder: Path) -> list[str]:
     return [] if folder == RESULTS / suite.name else [option, str(folder)]
 
 
-def _joined(*words: str) -> str:
-    return shlex.join(["python", "-m", "benchmarks", *words])
+def _joined(*arguments: str) -> str:
+    return shlex.join(["python", "-m", "benchmarks", *arguments])

@@ -63,7 +63,7 @@ def exercise_blocks(model: Model, devices: Sequence[Device], answer: Answer | No
     """
     blocks: list[Block] = [Heading("The resistive exercise device", 1)]
     if answer is not None:
-        blocks.append(Callout(answer.words, answer.how, "good"))
+        blocks.append(Callout(answer.text, answer.how, "good"))
     return [
         *blocks,
         Picture(PICTURE, "Moment at 90 deg by constant pressure; moment over the angle."),
@@ -118,7 +118,7 @@ def run_exercise(
         if isinstance(block, TextTable):
             console.print(terminal_table(block), "")
     if smallest:
-        console.print(f"{smallest.words}. {smallest.how}", highlight=False)
+        console.print(f"{smallest.text}. {smallest.how}", highlight=False)
     pictures = {PICTURE: exercise_plot(model, devices, smallest)}
     write_bytes(out / PLOTS / f"{PICTURE}.png", pictures[PICTURE])
     write_text(out / "report.md", to_markdown(blocks, pictures, PLOTS))

@@ -129,7 +129,7 @@ class Answer(NamedTuple):
     setting: Held | Schedule
 
     @property
-    def words(self) -> str:
+    def text(self) -> str:
         """The configuration, on one line."""
         return f"Smallest configuration: {self.device}"
 

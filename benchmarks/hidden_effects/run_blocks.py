@@ -258,16 +258,16 @@ def _claimed(path: Path) -> dict[str, Any] | None:
 
 
 def _greeting(order: Order, done: dict[int, CaseRecord], code: str) -> str:
-    words = (
+    text = (
         f"Block {order.block.name}, seed {order.seed}: {order.count} cases, "
         f"{order.executor.jobs} at a time"
     )
     if done:
-        words += f"; {len(done)} are done in {order.folder}"
+        text += f"; {len(done)} are done in {order.folder}"
     other = sum(record.code != code for record in done.values())
     if other:
-        words += f", {other} of them by other code than this (--recompute makes those anew)"
-    return words
+        text += f", {other} of them by other code than this (--recompute makes those anew)"
+    return text
 
 
 def _time(seconds: float) -> str:
@@ -275,5 +275,5 @@ def _time(seconds: float) -> str:
     return f"{seconds:.0f} s" if seconds < 90.0 else f"{minutes // 60} h {minutes % 60:02d} min"
 
 
-def _tell(words: str) -> None:
-    print(words, file=sys.stderr, flush=True)
+def _tell(message: str) -> None:
+    print(message, file=sys.stderr, flush=True)

@@ -97,7 +97,7 @@ class Decision(NamedTuple):
     """Decision for or against creep, with the reason in words."""
 
     asked: bool
-    words: str
+    text: str
 
 
 def decided(folds: Sequence[CreepFold]) -> Decision:

@@ -48,8 +48,8 @@ def loop_title(conditions: Sequence[Condition]) -> str:
     Triangle low, against 150 N
     """
     task = conditions[0].station.task
-    words = capital(task.name.replace("_", " "))
-    return f"{words}, against {task.load:g} N" if task.actuator == "regulator" else words
+    title = capital(task.name.replace("_", " "))
+    return f"{title}, against {task.load:g} N" if task.actuator == "regulator" else title
 
 
 def margin_table(conditions: Sequence[Condition], labels: Labels) -> TextTable:

@@ -135,7 +135,7 @@ def _beside(value: float | None, target: Target | None) -> dict[str, Any]:
     """A target and whether it is met; nothing where there is none."""
     if target is None:
         return {}
-    return {"target": target.words(), "met": None if value is None else target.met(value)}
+    return {"target": target.text(), "met": None if value is None else target.met(value)}
 
 
 def _amount(value: float | None, target: Target | None) -> dict[str, Any]:

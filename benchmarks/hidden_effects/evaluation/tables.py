@@ -70,9 +70,9 @@ def _block(block: str, figures: dict[str, Any]) -> list[str]:
 def _gap(gap: dict[str, Any]) -> list[str]:
     if not gap["n"]:
         return []
-    words = "gap closed on trials left out"
+    label = "gap closed on trials left out"
     return [
-        f"  {words}, {name}: {gap[key]['value']:.3f} (n {gap['n']}) {judged(gap[key])}".rstrip()
+        f"  {label}, {name}: {gap[key]['value']:.3f} (n {gap['n']}) {judged(gap[key])}".rstrip()
         for key, name in (("median", "median"), ("tenth_percentile", "tenth percentile"))
     ]
 
@@ -86,8 +86,8 @@ def _sizes(sizes: dict[str, Any]) -> list[str]:
         f"  95 % intervals cover {percent(sizes['covered'])} {judged(sizes['covered'])}",
     ]
     for path, figure in sizes["by_parameter"].items():
-        words = f"{100 * figure['median_error']:.1f} %"
-        lines.append(f"    {path:44s}{words:>8s}   covered {percent(figure['covered'])}")
+        median = f"{100 * figure['median_error']:.1f} %"
+        lines.append(f"    {path:44s}{median:>8s}   covered {percent(figure['covered'])}")
     return lines
 
 
@@ -105,8 +105,8 @@ def _rounds(rounds: dict[str, Any]) -> list[str]:
         figures = rounds[chooser]
         settled = "; ".join(f"{k}: {percent(each)}" for k, each in figures["settled"].items())
         lines.append(f"  {chooser}, of these settled within rounds {settled}")
-        words = f"    mean rounds {figures['mean_rounds']:.2f}, an effect named wrongly "
-        lines.append(words + percent(figures["wrong"]))
+        text = f"    mean rounds {figures['mean_rounds']:.2f}, an effect named wrongly "
+        lines.append(text + percent(figures["wrong"]))
     if choosers:
         lines.append(
             f"  proposed in fewer rounds than random {percent(rounds['faster'])}, in more "

@@ -77,7 +77,7 @@ def test_the_smallest_configuration_for_a_moment(tmp_path, moment, device):
     given = resistive_moment(model, answer.device, answer.setting.pressure, FULL_ANGLE).moment
     assert given == pytest.approx(moment, rel=1e-3)
     assert ("extrapolation" in answer.how) == (device != (1, 20, 250))
-    assert answer.words in (tmp_path / "report.md").read_text()
+    assert answer.text in (tmp_path / "report.md").read_text()
 
 
 def test_the_smallest_configuration_for_a_profile(tmp_path, profile):
