@@ -97,7 +97,7 @@ class TimeLeft:
             return least, least
         return least, least + self._expected(FITS) + self._expected(LOOK)
 
-    def words(self) -> str:
+    def text(self) -> str:
         """The remaining time as text; "" if it is unknown."""
         left = self.seconds()
         if left is None:
@@ -195,14 +195,14 @@ class StepProgress:
         now = time.monotonic()
         if not begins and now - self._said < PAUSE_S:
             return
-        left = self._left.words() if self._left else ""
+        left = self._left.text() if self._left else ""
         so_far = "" if begins else f" {done} of {total}"
         print(f"{step}{so_far} ...{left and f' {left}'}", file=sys.stderr, flush=True)
         self._said = now
 
     def overall(self, step: str) -> str:
         """Text with the remaining time of all steps, for the running step; "" for the others."""
-        return self._left.words() if self._left and step == self._step else ""
+        return self._left.text() if self._left and step == self._step else ""
 
 
 class _OverallColumn(ProgressColumn):
@@ -215,5 +215,5 @@ class _OverallColumn(ProgressColumn):
         self._progress = progress
 
     def render(self, task: Task) -> Text:
-        words = self._progress.overall(task.description)
-        return Text(f"in all: {words}" if words else "")
+        rest = self._progress.overall(task.description)
+        return Text(f"in all: {rest}" if rest else "")
