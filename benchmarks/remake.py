@@ -108,9 +108,9 @@ Run = Callable[[Sequence[str]], int]
 """Runs a command and gives its exit code."""
 
 
-def run_command(words: Sequence[str]) -> int:
+def run_command(arguments: Sequence[str]) -> int:
     """Run a command of this project; its exit code. Ctrl-C reaches it, and this job after it."""
-    return subprocess.run(command_line(words), cwd=ROOT, check=False).returncode
+    return subprocess.run(command_line(arguments), cwd=ROOT, check=False).returncode
 
 
 class Remake:
@@ -138,9 +138,13 @@ class Remake:
 
     def left(self) -> list[Step]:
         """Steps that are not done, or whose grounds have changed since."""
-        return [step for step in self.steps if self._begun(step, step.digest) < len(step.commands)]
+        return [
+            step
+            for step in self.steps
+            if self._commands_done(step, step.digest) < len(step.commands)
+        ]
 
-    def _begun(self, step: Step, grounds: str) -> int:
+    def _commands_done(self, step: Step, grounds: str) -> int:
         """How many of a step's commands have ended well on these grounds."""
         kept = self.done.get(step.name, {})
         return int(kept["commands"]) if kept.get("grounds") == grounds else 0
@@ -155,21 +159,21 @@ class Remake:
         for number, step in enumerate(self.steps, 1):
             # Asked anew at each: the steps before may have changed what it is made of.
             grounds = step.digest
-            begun = self._begun(step, grounds)
-            said = "done before" if begun == len(step.commands) else step.makes
+            done_before = self._commands_done(step, grounds)
+            said = "done before" if done_before == len(step.commands) else step.makes
             self._say(f"{number}/{len(self.steps)} {step.name}: {said}")
-            if not self._made(step, grounds, begun):
+            if not self._made(step, grounds, done_before):
                 self.table()
                 return False
         self.table()
         return True
 
-    def _made(self, step: Step, grounds: str, begun: int) -> bool:
+    def _made(self, step: Step, grounds: str, done_before: int) -> bool:
         """Run a step's commands from a number on; whether all ended well."""
-        for done, words in enumerate(step.commands[begun:], begun + 1):
-            code = self.run(words)
+        for done, arguments in enumerate(step.commands[done_before:], done_before + 1):
+            code = self.run(arguments)
             if code:
-                said = " ".join(("python", *words))
+                said = " ".join(("python", *arguments))
                 self._say(f"{step.name} ended with {code}: {said}; run it again to go on")
                 return False
             self.done[step.name] = {"grounds": grounds, "commands": done}
@@ -186,8 +190,8 @@ class Remake:
         lines = ["\t".join(row) for row in (("figure", "old", "new", "change"), *rows)]
         write_text(self.folder / TABLE, "\n".join(lines) + "\n")
 
-    def _say(self, words: str) -> None:
-        self.console.print(words, highlight=False, markup=False)
+    def _say(self, message: str) -> None:
+        self.console.print(message, highlight=False, markup=False)
 
 
 def _read(path: Path) -> dict:

@@ -47,7 +47,7 @@ class Step:
     @property
     def digest(self) -> str:
         """The digest of its commands and of all dependencies."""
-        parts = [" ".join(words) for words in self.commands]
+        parts = [" ".join(arguments) for arguments in self.commands]
         return hashlib.sha256("\n".join([*parts, *map(content, self.depends)]).encode()).hexdigest()
 
 
@@ -134,6 +134,6 @@ def _scores(own: Sequence[str], workers: Sequence[str]) -> Iterable[tuple[str, .
             yield (*own, "report", name)
 
 
-def command_line(words: Sequence[str]) -> list[str]:
+def command_line(arguments: Sequence[str]) -> list[str]:
     """The words of a command with this Python before them."""
-    return [sys.executable, *words]
+    return [sys.executable, *arguments]

@@ -112,7 +112,7 @@ class ADRC(ObserverFeedback[Settings]):
     def _gains(self, at: int) -> np.ndarray:
         return self._feedback[at]
 
-    def _wanted(self, planned: float, z: np.ndarray) -> float:
+    def _unclipped_voltage(self, planned: float, z: np.ndarray) -> float:
         return planned - float(self._feedback[self._observer.at] @ z)
 
     def _planned(self, time: float) -> float:

@@ -83,9 +83,9 @@ class LiftedModel:
         second = second_difference(self._count)
         near = sparse.diags_array((taut[:-2] & taut[1:-1] & taut[2:]).astype(float))
         price = near @ second @ self._a * math.sqrt(rough)
-        held = sparse.diags_array(np.sqrt(np.where(taut, HOLD, LOOSE))) @ self._a
+        penalty = sparse.diags_array(np.sqrt(np.where(taut, HOLD, LOOSE))) @ self._a
         effect = seen @ self._b
-        normal = effect.T @ effect + price.T @ price + held.T @ held
+        normal = effect.T @ effect + price.T @ price + penalty.T @ penalty
         return self._a @ spsolve(normal.tocsc(), effect.T @ (seen @ error))
 
 

@@ -152,7 +152,7 @@ class LQG:
     def _of_muscle(self, state: np.ndarray, due: int) -> float:
         """Voltage (V) beside the plan's in a period, by the state estimated for it."""
         n, estimator = self._filter.order, self._filter
-        unknown = float(state[n] + state[n + 1] * estimator.held(due))
+        unknown = float(state[n] + state[n + 1] * estimator.holding_voltage(due))
         feedback = -float(self._gains[estimator.place(due)] @ state[:n])
         # A model that is wrong makes of large gains a limit cycle.
         trust = min(1.0, TRUSTED_DOUBT / estimator.doubt)
@@ -184,8 +184,8 @@ class LQG:
         settings = self._settings(station)
         motion = nominal_motion(station.task.schedule.at, station)
         at = motion.stroke.nearest(position)
-        local, held = motion.stroke.models[at], motion.stroke.volts[at]
-        drift = np.hypot(settings.disturbance, SHARE * held / SHARE_TIME_S**0.5)
+        local, volts = motion.stroke.models[at], motion.stroke.volts[at]
+        drift = np.hypot(settings.disturbance, SHARE * volts / SHARE_TIME_S**0.5)
         steady = Unknowns(settings.process_noise, float(drift))
         late = round((station.action_delay + station.observation_delay) / station.period)
         gains = regulator(local.a, local.b, 1.0 / local.gain, settings.effort)

@@ -175,11 +175,11 @@ class _Trial:
         self.station, self.settings, task = station, settings, station.task
         self.needed = nominal_motion(reference, station).volts
         times = station.period * np.arange(len(self.needed) + 1)
-        self.wanted = np.array([reference(time) for time in times.tolist()])
+        self.target = np.array([reference(time) for time in times.tolist()])
         self.horizon = max(2, round(settings.horizon / station.period))
         self.delay = round(station.action_delay / station.period)
         said = ModelKey(station.model), task.schedule.quantity, task.load, station.pressure
-        follows = self.needed.tobytes(), self.wanted.tobytes()
+        follows = self.needed.tobytes(), self.target.tobytes()
         self._key = *said, station.period, self.delay, settings, *follows
 
     def __hash__(self) -> int:
@@ -193,5 +193,5 @@ class _Trial:
 def _designed(trial: _Trial) -> BankDesign:
     station, settings = trial.station, trial.settings
     beyond = trial.horizon + trial.delay
-    motion = linear_motion(trial.needed, trial.wanted, station, beyond)
+    motion = linear_motion(trial.needed, trial.target, station, beyond)
     return bank_design(motion, station, trial.horizon, settings.wander, settings.jolt)

@@ -253,7 +253,7 @@ class Oracle:
         self._needed = np.append(needed, np.full(delay + len(ahead.blocks) + 1, needed[-1]))
         count = ahead.parts * len(self._needed)
         times = station.period / ahead.parts * np.arange(count + 1)
-        self._wanted = np.array([reference(time) for time in times.tolist()])
+        self._targets = np.array([reference(time) for time in times.tolist()])
         self._counts = np.where(times <= station.task.duration + 1e-9, 1.0 / self._unit, 0.0)
 
     def act(self, measurement: Measurement, time: float) -> float:
@@ -290,21 +290,21 @@ class Oracle:
         motor, regulator = environment.motor_voltage, environment.regulator_voltage
         ahead, delay = self._horizon, len(self._sent)
         at = ahead.parts * begin + ahead.ends
-        wanted, weights = self._zero + self._wanted[at], ahead.weights * self._counts[at]
+        targets, weights = self._zero + self._targets[at], ahead.weights * self._counts[at]
         volts = np.empty((PLANS, delay + len(self._plan)))
         volts[:, :delay] = self._sent
 
         def errors(plans: NDArray[np.float64]) -> NDArray[np.float64]:
             parts = [predicted(plans[k : k + PLANS]) for k in range(0, len(plans), PLANS)]
-            return (np.concatenate(parts) - wanted) * weights
+            return (np.concatenate(parts) - targets) * weights
 
         def predicted(plans: NDArray[np.float64]) -> NDArray[np.float64]:
             volts[: len(plans), delay:] = plans
-            held = volts[: len(plans), ahead.periods]
+            by_period = volts[: len(plans), ahead.periods]
             if self._regulates:
-                commands = Commands(motor, (held + jump).clip(0.0, VOLTAGE_LIMIT))
+                commands = Commands(motor, (by_period + jump).clip(0.0, VOLTAGE_LIMIT))
             else:
-                commands = Commands(held, regulator)
+                commands = Commands(by_period, regulator)
             # A copy: the next prediction is written over it.
             return self._prediction(condition, commands, len(plans))[self._quantity].copy()
 

@@ -80,9 +80,9 @@ class PID:
             gains.filter + period
         )
         action = gains.proportional * error + self._integral + self._derivative
-        wanted = self._offset + self.feedforward(time) + action
-        voltage = min(max(wanted, 0.0), VOLTAGE_LIMIT)
-        if voltage == wanted or (wanted > voltage) != (error > 0.0):
+        unclipped = self._offset + self.feedforward(time) + action
+        voltage = min(max(unclipped, 0.0), VOLTAGE_LIMIT)
+        if voltage == unclipped or (unclipped > voltage) != (error > 0.0):
             self._integral += gains.integral * period * error
         self._last_error = error
         return voltage

@@ -151,13 +151,15 @@ def differences(file: PolicyFile, station: StationInfo, anywhere: bool = False) 
         differing.append(f"the task's kind is {kind}, trained for {file.task}")
     trained = file.environment["kwargs"]
     if not anywhere:
-        for what, came, wanted, unit in (
+        for what, actual, expected, unit in (
             ("control rate", 1.0 / station.period, trained["control_rate_hz"], "Hz"),
             ("action delay", station.action_delay, trained["action_delay_s"], "s"),
             ("observation delay", station.observation_delay, trained["observation_delay_s"], "s"),
         ):
-            if not math.isclose(came, wanted, rel_tol=1e-6, abs_tol=1e-6):
-                differing.append(f"the {what} is {came:g} {unit}, trained for {wanted:g} {unit}")
+            if not math.isclose(actual, expected, rel_tol=1e-6, abs_tol=1e-6):
+                differing.append(
+                    f"the {what} is {actual:g} {unit}, trained for {expected:g} {unit}"
+                )
     return differing + _other_rows(file, station)
 
 
@@ -168,10 +170,10 @@ def _other_rows(file: PolicyFile, station: StationInfo) -> list[str]:
     if len(rows) != len(known):
         differing.append(f"the observation has {len(rows)} entries, trained for {len(known)}")
     others = [
-        f"entry {i} of the observation is {came[0]} (1.0 = {came[1]}), trained for {wanted[0]} "
-        f"(1.0 = {wanted[1]})"
-        for i, (came, wanted) in enumerate(zip(rows, known, strict=False))
-        if came != wanted
+        f"entry {i} of the observation is {actual[0]} (1.0 = {actual[1]}), trained for "
+        f"{trained[0]} (1.0 = {trained[1]})"
+        for i, (actual, trained) in enumerate(zip(rows, known, strict=False))
+        if actual != trained
     ]
     differing += others[:SHOWN]
     if len(others) > SHOWN:

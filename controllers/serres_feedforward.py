@@ -50,9 +50,9 @@ class SerresFeedforward(VoltageTable):
         pressure_kpa = station.pressure / 1e3
         samples = math.ceil(station.task.schedule.duration / SAMPLE_TIME - 1e-9) + 1
         times = SAMPLE_TIME * np.arange(samples)
-        wanted = radius * np.array([reference(float(time)) for time in times])
+        target = radius * np.array([reference(float(time)) for time in times])
         try:
-            profile = feedforward(wanted, pressure_kpa)
+            profile = feedforward(target, pressure_kpa)
         except ValueError as error:
             raise ValueError(self._explained(error, pressure_kpa, rotation)) from error
         self._period = station.period

@@ -128,7 +128,7 @@ class SlidingMode(ObserverFeedback[Settings]):
         # Within the layer.
         return self._surfaces[at].equivalent + self._surfaces[at].switching
 
-    def _wanted(self, planned: float, z: np.ndarray) -> float:
+    def _unclipped_voltage(self, planned: float, z: np.ndarray) -> float:
         surface, most = self._surfaces[self._observer.at], self._most
         pushed = min(max(float(surface.switching @ z), -most), most)
         return planned - float(surface.equivalent @ z) - pushed

@@ -319,22 +319,22 @@ def _beyond(file: str, place: str, came: str) -> DocumentError:
     )
 
 
-def _broken(text: str, words: str) -> str:
+def _broken(text: str, message: str) -> str:
     """Which line of a text is broken, and what the parser says of it.
 
     Args:
         text: of the file.
-        words: the parser's, which end in `(at line 5, column 7)` or `(at end of document)`.
+        message: the parser's, which end in `(at line 5, column 7)` or `(at end of document)`.
     """
-    match = re.search(r"at line (\d+)", words)
+    match = re.search(r"at line (\d+)", message)
     lines = text.splitlines() or [""]
     number = int(match[1]) if match else len(lines)
     line = lines[min(number, len(lines)) - 1].strip()
     shown = line if len(line) <= _SHOWN else line[:_SHOWN] + "..."
-    return f"line {number}, {shown!r}: {_line(words)}"
+    return f"line {number}, {shown!r}: {_line(message)}"
 
 
-def _line(words: str) -> str:
+def _line(message: str) -> str:
     """A parser's words on one line, of a length that a terminal shows."""
-    words = printable(" ".join(words.split()))
-    return words if len(words) <= 4 * _SHOWN else words[: 4 * _SHOWN] + "..."
+    message = printable(" ".join(message.split()))
+    return message if len(message) <= 4 * _SHOWN else message[: 4 * _SHOWN] + "..."

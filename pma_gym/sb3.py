@@ -183,8 +183,8 @@ class SB3VecEnv(EngineVecEnv):
         """Call a method of each environment asked for, as `PMAEnv` has it; `reset` too."""
         results = super().env_method(method_name, *method_args, indices=indices, **method_kwargs)
         if method_name == "reset":
-            begun = [member.index for member in self._members(indices)]
-            self._returns[begun], self._lengths[begun] = 0.0, 0
+            restarted = [member.index for member in self._members(indices)]
+            self._returns[restarted], self._lengths[restarted] = 0.0, 0
         return results
 
     def _pressures(self) -> list[Any]:

@@ -81,9 +81,9 @@ def suffix(unit: str) -> str:
     """
     if unit == "1":
         return ""
-    words = unit.replace("1/", "per_", 1) if unit.startswith("1/") else unit
-    words = words.replace("/", "_per_").replace(" ", "_").replace("^", "").replace("%", "percent")
-    return words.lower()
+    name = unit.replace("1/", "per_", 1) if unit.startswith("1/") else unit
+    name = name.replace("/", "_per_").replace(" ", "_").replace("^", "").replace("%", "percent")
+    return name.lower()
 
 
 def with_unit(number: str, unit: str) -> str:

@@ -31,10 +31,10 @@ def replay(left, clock, *steps):
 
 def test_nothing_is_known_before_the_first_step_has_ended(clock):
     left = TimeLeft(DIAGNOSIS, clock)
-    assert left.seconds() is None and left.words() == ""
+    assert left.seconds() is None and left.text() == ""
     left("refitting parameters", 0, 1)
     clock.now += 50.0
-    assert left.seconds() is None and left.words() == ""
+    assert left.seconds() is None and left.text() == ""
 
 
 def test_steps_to_come_are_weighed_by_those_that_ended(clock):
@@ -46,7 +46,7 @@ def test_steps_to_come_are_weighed_by_those_that_ended(clock):
     least += pace * SHARES["putting the answer together"]
     more = pace * (SHARES["fitting effect"] + SHARES["looking for effect"])
     assert left.seconds() == pytest.approx((least, least + more))
-    assert left.words() == "about 2 min left (about 6 min if it adds an effect)"
+    assert left.text() == "about 2 min left (about 6 min if it adds an effect)"
 
 
 def test_a_step_that_ran_before_takes_as_long_again(clock):
@@ -75,11 +75,11 @@ def test_the_step_that_runs_counts_by_its_own_pace(clock):
     pace = 70.0 / SHARES["refitting parameters"]
     least = 4 * 3600.0 + pace * SHARES["putting the answer together"]
     assert left.seconds() == pytest.approx((least, least))
-    assert left.words() == "about 4.0 h left"
+    assert left.text() == "about 4.0 h left"
     clock.now += 3600.0
     left("trials left out", 4, 5)
     assert left.seconds()[0] == pytest.approx(1800.0 + least - 4 * 3600.0)
-    assert left.words() == "about 30 min left"
+    assert left.text() == "about 30 min left"
 
 
 def test_a_step_that_outlasts_its_estimate_has_no_negative_rest(clock):
@@ -88,7 +88,7 @@ def test_a_step_that_outlasts_its_estimate_has_no_negative_rest(clock):
     left("trials left out", 0, 3)
     clock.now += 1000.0
     assert left.seconds()[0] == pytest.approx(1.0)
-    assert left.words() == "less than a minute left"
+    assert left.text() == "less than a minute left"
 
 
 @pytest.mark.parametrize("search", [pytest.param(True, marks=pytest.mark.campaign), False])

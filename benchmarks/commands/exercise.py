@@ -50,7 +50,7 @@ def exercise(
 ) -> None:
     """Show which moments muscles of which size give, and the smallest for a prescription."""
     from benchmarks.exercise.choose_device import Choice, ChoiceError, run_exercise
-    from benchmarks.exercise.profile import ProfileError, held, read_profile
+    from benchmarks.exercise.profile import ProfileError, constant_prescription, read_profile
     from pma_gym.plant.exercise_device.prescription import UnreachableError
     from pma_gym.terminal import SafeConsole
 
@@ -60,8 +60,14 @@ def exercise(
         if moment is not None and profile is not None:
             raise ChoiceError("--moment and --profile are two prescriptions; give one of them")
         choice = Choice(muscles, diameter, length, radius)
-        wanted = read_profile(profile) if profile else None if moment is None else held(moment)
-        run_exercise(choice, wanted, out, SafeConsole())
+        prescription = (
+            read_profile(profile)
+            if profile
+            else None
+            if moment is None
+            else constant_prescription(moment)
+        )
+        run_exercise(choice, prescription, out, SafeConsole())
     except (ChoiceError, ProfileError, UnreachableError) as error:
         refuse(error)
 

@@ -302,10 +302,10 @@ def _say_ranks(spec: ControllerSpec, suite: FrozenSuite, out: Path, console: Con
 def _line(spec: ControllerSpec, standings: Standings) -> str:
     mine = next(row for row in standings.rows if row.name == spec.name)
     unit = standings.errors.measure.unit
-    words = f"{mine.mean.estimate:.3g} {unit} ({mine.mean.low:.3g} to {mine.mean.high:.3g})"
+    text = f"{mine.mean.estimate:.3g} {unit} ({mine.mean.low:.3g} to {mine.mean.high:.3g})"
     rivals = len(standings.rivals)
     if mine.rank is not None and rivals > 1:
-        words += f", rank {mine.rank} of {rivals}"
+        text += f", rank {mine.rank} of {rivals}"
     if mine.failures:
-        words += f", {mine.failures} cases failed"
-    return words
+        text += f", {mine.failures} cases failed"
+    return text

@@ -124,11 +124,11 @@ def suite_documents() -> list[dict[str, object]]:
 
 def _control(suite: FrozenSuite) -> str:
     """Rate and delays, for people."""
-    words = [f"{suite.control_rate_hz:g} Hz"]
+    parts = [f"{suite.control_rate_hz:g} Hz"]
     for name, what in (("action_delay_s", "commands"), ("observation_delay_s", "readings")):
         delay = suite.environment.get(name, 0.0)
-        words += [f"{what} {1e3 * delay:g} ms late"] if delay else []
-    return ", ".join(words)
+        parts += [f"{what} {1e3 * delay:g} ms late"] if delay else []
+    return ", ".join(parts)
 
 
 def remove_controller(name: str, suites: Sequence[FrozenSuite], results: Path) -> dict[Path, int]:

@@ -153,7 +153,7 @@ def exercise_blocks(model: Model, devices: Sequence[Device], answer: Answer | No
     """
     blocks: list[Block] = [Heading("The resistive exercise device", 1)]
     if answer is not None:
-        blocks.append(Callout(answer.words, answer.how, "good"))
+        blocks.append(Callout(answer.text, answer.how, "good"))
     return [
         *blocks,
         Picture(PICTURE, "Moment at 90 deg by constant pressure; moment over the angle."),
@@ -184,13 +184,13 @@ COLUMNS = (
 
 
 def run_exercise(
-    choice: Choice, wanted: Prescription | None, out: Path, console: Console
+    choice: Choice, prescription: Prescription | None, out: Path, console: Console
 ) -> Answer | None:
     """Print the tables and write report, picture and figures.
 
     Args:
         choice: the configurations.
-        wanted: the prescription, or None.
+        prescription: the prescription, or None.
         out: folder for `report.html`, `report.md`, `moments.csv` and `plots/`.
         console: where to print.
     Returns:
@@ -201,14 +201,14 @@ def run_exercise(
     """
     model = load_model(MODEL)
     shown = choice.shown(model)
-    smallest = answer(model, choice.searched(model), wanted) if wanted else None
+    smallest = answer(model, choice.searched(model), prescription) if prescription else None
     devices = sorted({*shown, smallest.device}) if smallest else shown
     blocks = exercise_blocks(model, devices, smallest)
     for block in blocks:
         if isinstance(block, TextTable):
             console.print(terminal_table(block), "")
     if smallest:
-        console.print(f"{smallest.words}. {smallest.how}", highlight=False)
+        console.print(f"{smallest.text}. {smallest.how}", highlight=False)
     pictures = {PICTURE: exercise_plot(model, devices, smallest)}
     write_bytes(out / PLOTS / f"{PICTURE}.png", pictures[PICTURE])
     write_text(out / "report.md", to_markdown(blocks, pictures, PLOTS))

@@ -101,16 +101,18 @@ def _draw_angles(axis: Axes, model: Model, answer: Answer | None) -> None:
 
 
 def _draw_answer(axis: Axes, model: Model, answer: Answer) -> None:
-    degrees = answer.wanted.angle / _DEG
+    degrees = answer.prescription.angle / _DEG
     label = f"smallest: {answer.device}".replace(" on a pulley", "\non a pulley")
-    if answer.wanted.scheduled:
+    if answer.prescription.scheduled:
         _draw_band(axis, model, answer.device, answer.setting, "#D55E00", label)
-        axis.plot(degrees, answer.wanted.moment, color="#D55E00", marker=".", label="prescription")
+        axis.plot(
+            degrees, answer.prescription.moment, color="#D55E00", marker=".", label="prescription"
+        )
         return
     angle = _DEG * np.linspace(0.0, 90.0, 91)
     moment = resistive_moment(model, answer.device, answer.setting[0], angle).moment
     axis.plot(angle / _DEG, moment, color="#D55E00", label=label)
-    axis.plot(degrees, answer.wanted.moment, "o", color="#D55E00", label="prescription")
+    axis.plot(degrees, answer.prescription.moment, "o", color="#D55E00", label="prescription")
 
 
 def _draw_band(

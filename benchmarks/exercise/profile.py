@@ -40,7 +40,7 @@ class Prescription(NamedTuple):
     scheduled: bool
 
 
-def held(moment: float) -> Prescription:
+def constant_prescription(moment: float) -> Prescription:
     """A moment (N m) that one pressure holds at 90 deg.
 
     Raises:
@@ -124,12 +124,12 @@ def _number(row: dict, column: str, largest: float, place: str) -> float:
 class Answer(NamedTuple):
     """A prescription's smallest configuration and its pressures."""
 
-    wanted: Prescription
+    prescription: Prescription
     device: Device
     setting: Held | Schedule
 
     @property
-    def words(self) -> str:
+    def text(self) -> str:
         """The configuration, on one line."""
         return f"Smallest configuration: {self.device}"
 
@@ -141,16 +141,16 @@ class Answer(NamedTuple):
             if self.device.muscles.extrapolated
             else "It is the tested muscle."
         )
-        return f"{_pressures(self.wanted, self.setting)} {trust}"
+        return f"{_pressures(self.prescription, self.setting)} {trust}"
 
 
-def _pressures(wanted: Prescription, setting: Held | Schedule) -> str:
+def _pressures(prescription: Prescription, setting: Held | Schedule) -> str:
     if isinstance(setting, Held):
         return (
-            f"{wanted.moment[0]:g} N m at 90 deg is held at {1e-3 * setting.pressure:.0f} kPa, the "
-            "cable set at that pressure."
+            f"{prescription.moment[0]:g} N m at 90 deg is held at "
+            f"{1e-3 * setting.pressure:.0f} kPa, the cable set at that pressure."
         )
-    degrees = wanted.angle / SI_FACTORS["deg"]
+    degrees = prescription.angle / SI_FACTORS["deg"]
     shown = np.unique(np.linspace(0, len(degrees) - 1, 7).round().astype(int))
     points = ", ".join(f"{degrees[i]:g} deg {1e-3 * setting.pressure[i]:.0f}" for i in shown)
     return (
@@ -159,20 +159,20 @@ def _pressures(wanted: Prescription, setting: Held | Schedule) -> str:
     )
 
 
-def answer(model: Model, devices: list[Device], wanted: Prescription) -> Answer:
+def answer(model: Model, devices: list[Device], prescription: Prescription) -> Answer:
     """The smallest of the devices that gives a prescription.
 
     Args:
         model: of the station.
         devices: to choose from.
-        wanted: the prescription.
+        prescription: the prescription.
     Raises:
         UnreachableError: none gives it.
     """
 
     def attempt(device: Device) -> Held | Schedule:
-        if wanted.scheduled:
-            return follow(model, device, wanted.angle, wanted.moment)
-        return hold(model, device, float(wanted.moment[0]))
+        if prescription.scheduled:
+            return follow(model, device, prescription.angle, prescription.moment)
+        return hold(model, device, float(prescription.moment[0]))
 
-    return Answer(wanted, *smallest(devices, attempt))
+    return Answer(prescription, *smallest(devices, attempt))

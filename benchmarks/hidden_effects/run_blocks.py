@@ -204,14 +204,14 @@ class Progress:
 
     def __init__(self, order: Order, known: Sequence[Outcome]) -> None:
         self.order, self.outcomes = order, list(known)
-        self.begun, self.before = time.monotonic(), len(known)
+        self.start, self.before = time.monotonic(), len(known)
 
     def tell(self, record: CaseRecord) -> None:
         """One more case is done."""
         outcome = scoring.outcome_of(record)
         self.outcomes.append(outcome)
         done, count = len(self.outcomes), self.order.count
-        left = (time.monotonic() - self.begun) / (done - self.before) * (count - done)
+        left = (time.monotonic() - self.start) / (done - self.before) * (count - done)
         size = "" if outcome.ratio is None else f" (r {outcome.ratio:.2f})"
         answer = outcome.said if outcome.answered else f"NO ANSWER, {outcome.sentence}"
         first = RATES[self.order.block.name][0]
@@ -256,16 +256,16 @@ def _claimed(path: Path) -> dict[str, Any] | None:
 
 
 def _greeting(order: Order, done: dict[int, CaseRecord], code: str) -> str:
-    words = (
+    text = (
         f"Block {order.block.name}, seed {order.seed}: {order.count} cases, "
         f"{order.executor.jobs} at a time"
     )
     if done:
-        words += f"; {len(done)} are done in {order.folder}"
+        text += f"; {len(done)} are done in {order.folder}"
     other = sum(record.code != code for record in done.values())
     if other:
-        words += f", {other} of them by other code than this (--recompute makes those anew)"
-    return words
+        text += f", {other} of them by other code than this (--recompute makes those anew)"
+    return text
 
 
 def _time(seconds: float) -> str:
@@ -273,5 +273,5 @@ def _time(seconds: float) -> str:
     return f"{seconds:.0f} s" if seconds < 90.0 else f"{minutes // 60} h {minutes % 60:02d} min"
 
 
-def _tell(words: str) -> None:
-    print(words, file=sys.stderr, flush=True)
+def _tell(message: str) -> None:
+    print(message, file=sys.stderr, flush=True)

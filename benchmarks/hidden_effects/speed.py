@@ -64,9 +64,9 @@ def measure(size: Size, jobs: int) -> tuple[float, float, str, list[str]]:
 
 
 def _timed(trials: list[Trial], jobs: int) -> tuple[float, Diagnosis]:
-    begun = time.perf_counter()
+    start = time.perf_counter()
     diagnosis = diagnose(trials, lab_model(), jobs=jobs)
-    return time.perf_counter() - begun, diagnosis
+    return time.perf_counter() - start, diagnosis
 
 
 def _asked(size: Size, number: int, generator: np.random.Generator) -> Trial:

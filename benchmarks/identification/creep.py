@@ -97,7 +97,7 @@ class Decision(NamedTuple):
     """Decision for or against creep, with the reason in words."""
 
     asked: bool
-    words: str
+    text: str
 
 
 def decided(folds: Sequence[CreepFold]) -> Decision:
@@ -127,10 +127,10 @@ class _QuasiStatic:
         self.kept = np.exp(-self.length / branch.time_constant)
         # Force that a part of one metre a second adds to the branch.
         self.added = branch.stiffness * branch.time_constant * (1.0 - self.kept)
-        begun = self.hysteresis.memory_at_start
-        held = np.full_like(pressure, self.hysteresis.force * begun)
-        self.contraction = contraction_at(self.force, pressure, held)
-        self.memory, self.branch = np.full_like(pressure, begun), np.zeros_like(pressure)
+        memory = self.hysteresis.memory_at_start
+        hysteresis_force = np.full_like(pressure, self.hysteresis.force * memory)
+        self.contraction = contraction_at(self.force, pressure, hysteresis_force)
+        self.memory, self.branch = np.full_like(pressure, memory), np.zeros_like(pressure)
 
     def part(self, load: np.ndarray, direction: float) -> None:
         """Go on for one part, to a load (N), in a direction of travel (1: contraction)."""

@@ -53,9 +53,9 @@ def run_identify(out: Path, jobs: int = 2, console: Console | None = None) -> Mo
     chosen = [fold.creeping if decision.asked else fold.plain for fold in folds]
     model = _noted(whole, [fitted_parameters(fold) for fold, _ in chosen])
     judged = [errors for _, errors in chosen]
-    words = [decision.words, *station.unexplained(whole, data, steps)]
-    write_text(out, _header(station.figures(judged), words) + dump_model(model))
-    _print(console, model, judged, words)
+    remarks = [decision.text, *station.unexplained(whole, data, steps)]
+    write_text(out, _header(station.figures(judged), remarks) + dump_model(model))
+    _print(console, model, judged, remarks)
     console.print(f"written: {out}")
     return model
 
@@ -166,19 +166,21 @@ def borne(value: float, unit: float) -> str:
     return f"{round(value / unit) * unit:.{max(0, round(-math.log10(unit)))}f}"
 
 
-def _header(figures: dict[str, float], words: list[str]) -> str:
+def _header(figures: dict[str, float], remarks: list[str]) -> str:
     lines = [
         "Written by `python -m benchmarks identify`. Intervals: 95 %, jackknife over pressures.",
         f"Left-out pressures: extension {figures['extension_mm']:.2f} mm RMSE, rotation "
         f"{figures['rotation_deg']:.2f} deg RMSE, no-load contraction within "
         f"{figures['no_load_mm']:.2f} mm.",
         "Not explained:",
-        *(f"- {line}" for line in words),
+        *(f"- {line}" for line in remarks),
     ]
     return "".join(f"# {line}\n" for line in lines)
 
 
-def _print(console: Console, model: Model, folds: list[station.LeftOut], words: list[str]) -> None:
+def _print(
+    console: Console, model: Model, folds: list[station.LeftOut], remarks: list[str]
+) -> None:
     table = Table("parameter", "value", "low", "high", title="Identified station")
     for path, note in model.notes.items():
         if note.low is not None:
@@ -208,5 +210,5 @@ def _print(console: Console, model: Model, folds: list[station.LeftOut], words: 
         verdict = "met" if figure <= target else "MISSED"
         console.print(f"{name}: {figure:.2f}, target {target:g}: {verdict}")
     console.print("Not explained:")
-    for line in words:
+    for line in remarks:
         console.print(f"- {line}")

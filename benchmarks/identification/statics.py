@@ -222,12 +222,12 @@ def load_cycle(model: Model, pressure: np.ndarray, load: np.ndarray) -> LoadCycl
     force = muscle_force(model)
     hysteresis = model.parameters["hysteresis"]
     damping = damping_of(model, pressure)
-    begun = hysteresis.memory_at_start
-    x0 = contraction_at(force, pressure, np.full_like(load, hysteresis.force * begun))
+    memory = hysteresis.memory_at_start
+    x0 = contraction_at(force, pressure, np.full_like(load, hysteresis.force * memory))
 
     def stretched(x: np.ndarray) -> np.ndarray:
         # Nothing turns back before x0: the search asks beyond it, where the state would run away.
-        return (1.0 + begun) * np.exp(-np.maximum(x0 - x, 0.0) / hysteresis.distance) - 1.0
+        return (1.0 + memory) * np.exp(-np.maximum(x0 - x, 0.0) / hysteresis.distance) - 1.0
 
     def loaded(p: np.ndarray, x: np.ndarray) -> np.ndarray:
         return force(p, x) - hysteresis.force * stretched(x)

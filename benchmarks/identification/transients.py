@@ -90,8 +90,8 @@ def _simulate(
     pressure = (1.0 - fading if filling else fading) * steps.pressure
     slope = 2.91e-3  # N/Pa, Serres 2008, 5.1.1: F_ce in I2 lies on this line.
     final = steps.force - steps.load
-    wanted = final - slope * (steps.pressure - pressure)
-    target = np.clip(wanted / final, 0.0, 1.0)
+    equilibrium = final - slope * (steps.pressure - pressure)
+    target = np.clip(equilibrium / final, 0.0, 1.0)
     keep = np.exp(-STEP_S * steps.stiffness / damping)
     share = np.empty_like(target)
     share[0] = 0.0 if filling else 1.0

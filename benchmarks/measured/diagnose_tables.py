@@ -78,13 +78,13 @@ def run_measured(
         console: where to print.
         recompute: anew what other code made.
     """
-    console, begun = console or SafeConsole(), time.perf_counter()
+    console, start = console or SafeConsole(), time.perf_counter()
     stages = Stages(out / "stages", recompute)
     if others := stages.others():
         console.print(others, highlight=False, markup=False, soft_wrap=True)
     with _bar(console) as tell:
         result = _computed(stages, jobs, seed, most, tell)
-    result = replace(result, seconds=time.perf_counter() - begun)
+    result = replace(result, seconds=time.perf_counter() - start)
     write_text(out / "model.toml", result.steps[-1].model)
     write_text(out / "measured.json", json.dumps(asdict(result), indent=1) + "\n")
     write_text(out / "measured.html", measured_page(result))

@@ -77,22 +77,22 @@ class Rig:
             {each.name: each for each in candidate_effects(initial_model, orders)},
         )
 
-    def fit(self, effects: Sequence[str], begun: Model) -> Fitted | None:
+    def fit(self, effects: Sequence[str], start_model: Model) -> Fitted | None:
         """The given model with effects in it, fitted to the trials.
 
         Args:
             effects: names of the effects.
-            begun: where the fit begins; an effect that it lacks begins as usual.
+            start_model: where the fit begins; an effect that it lacks begins as usual.
         """
         chosen = [self.known[name] for name in effects]
         starts = {
-            each.name: values(begun, each.paths)
-            if each.effect in begun.parameters
+            each.name: values(start_model, each.paths)
+            if each.effect in start_model.parameters
             else each.probes[len(each.probes) // 2]
             for each in chosen
         }
         free = self.problem.own.free
-        own = dict(zip(free, values(begun, free).tolist(), strict=True))
+        own = dict(zip(free, values(start_model, free).tolist(), strict=True))
         return self.problem.fit(self.initial_model.replace(own), chosen, starts)
 
 
@@ -101,9 +101,9 @@ AT_LOAD = "extension_at_load_mm"
 matter then."""
 
 
-def _compared(held: Sequence[Array], logged: Sequence[Logged]) -> dict[str, Array]:
+def _compared(readings: Sequence[Array], logged: Sequence[Logged]) -> dict[str, Array]:
     by_figure: dict[str, list[float]] = {name: [] for name in FIGURES}
-    for simulated, each in zip(held, logged, strict=True):
+    for simulated, each in zip(readings, logged, strict=True):
         for name, (signal, plus, minus, unit) in FIGURES.items():
             channel = RIGS["station"].outputs.index(signal)
             if {plus, minus} & set(each.missing[channel].tolist()):
@@ -147,10 +147,10 @@ def _errors(
         np.array([np.inf]),
         own={path: [float(each.order or 0.0) for each in loaded] for path in _repeats(model)},
     )
-    held = whitened.readings(values(model, some))
-    if held is None:
+    readings = whitened.readings(values(model, some))
+    if readings is None:
         return {name: np.array([np.nan]) for name in FIGURES}
-    return _compared(held, whitened.logged)
+    return _compared(readings, whitened.logged)
 
 
 def _repeats(model: Model) -> list[str]:

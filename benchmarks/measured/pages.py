@@ -43,7 +43,7 @@ def _blocks(result: Measured) -> list[Block]:
             f"{', '.join(effects) or 'nothing'}.",
             tone="good",
         ),
-        *(Paragraph(words) for words in verdict_text(result)),
+        *(Paragraph(text) for text in verdict_text(result)),
         Picture(
             "errors",
             "Error of table I3's rows from the commands alone, model after model: at pressures "
@@ -81,7 +81,7 @@ def _blocks(result: Measured) -> list[Block]:
             words=2,
         )
     )
-    blocks += [Paragraph(words) for words in experiment_text(result)]
+    blocks += [Paragraph(text) for text in experiment_text(result)]
     blocks += [
         Heading("Validation under triangular pressure (figures 28 and 29)"),
         Paragraph(

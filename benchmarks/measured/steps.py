@@ -188,10 +188,12 @@ def folds(
     return {name: (squares[name] / counts[name]) ** 0.5 for name in names}
 
 
-def _fitted(rig: Rig, effects: Sequence[str], begun: Model) -> Model:
+def _fitted(rig: Rig, effects: Sequence[str], start_model: Model) -> Model:
     """The better of fits that begin at an amended model and at the given one."""
     fits = [
-        fit for model in (begun, rig.initial_model) if (fit := rig.fit(effects, model)) is not None
+        fit
+        for model in (start_model, rig.initial_model)
+        if (fit := rig.fit(effects, model)) is not None
     ]
     if not fits:
         raise ValueError(

@@ -83,8 +83,8 @@ def round_rows(rounds: Sequence[Round]) -> Rows:
 
 def equals(one: Round, name: str) -> list[str]:
     """Effects that explain a round's trials as well as one that it added."""
-    words = f"explains these data as well as {name}"
-    return [other for other, _, _, why in one.rivals if why == words]
+    reason = f"explains these data as well as {name}"
+    return [other for other, _, _, why in one.rivals if why == reason]
 
 
 def error_rows(result: Measured) -> Rows:
@@ -140,7 +140,7 @@ REPLAY_HEADER = ("model", "slope", "intercept", "mean", "mean, signed", "RMSE", 
 
 def experiment_text(result: Measured) -> list[str]:
     """Describe the next experiment."""
-    words = []
+    paragraphs = []
     for number, each in enumerate(result.rounds, 1):
         following = each.next_experiment
         if following is not None:
@@ -148,14 +148,14 @@ def experiment_text(result: Measured) -> list[str]:
             why = f"tell {' and '.join(names)} apart"
             if len(names) == 1:
                 why = f"see whether {names[0]} is there"
-            words.append(f"Round {number} proposes, to {why}: {following['excitation']}.")
+            paragraphs.append(f"Round {number} proposes, to {why}: {following['excitation']}.")
     for number, each in enumerate(result.proposals, 1):
         shows = ", ".join(map(readable, each.shows))
-        words.append(
+        paragraphs.append(
             f"Experiment {number} ({each.minutes:.2g} min): {each.excitation}. "
             f"It would show {shows}."
         )
-    return words
+    return paragraphs
 
 
 def not_detectable_rows(result: Measured) -> Rows:

@@ -200,8 +200,8 @@ class SuiteRecord:
 
     def done(self, entry: Entry) -> tuple[int, int]:
         """Count a controller's cases with a row, and all of its cases."""
-        wanted = [e for e in self.suite.episodes if entry.does(e.task)]
-        return sum((entry.spec.name, e) in self.rows for e in wanted), len(wanted)
+        planned = [e for e in self.suite.episodes if entry.does(e.task)]
+        return sum((entry.spec.name, e) in self.rows for e in planned), len(planned)
 
     def whole(self, tasks: tuple[str, ...]) -> list[Entry]:
         """Controllers that have a row for every episode of these tasks."""
@@ -220,8 +220,8 @@ class SuiteRecord:
         episodes = [e for e in self.suite.episodes if e.task in measure.tasks]
         names = [entry.spec.name for entry in self.whole(measure.tasks)]
         if not names:
-            begun = {name for name, e in self.rows if e.task in measure.tasks}
-            names = [e.spec.name for e in self.entries if e.spec.name in begun]
+            started = {name for name, e in self.rows if e.task in measure.tasks}
+            names = [e.spec.name for e in self.entries if e.spec.name in started]
             episodes = [e for e in episodes if all((name, e) in self.rows for name in names)]
         values = [[measure.of_row(self.rows[name, e]) for e in episodes] for name in names]
         array = np.array(values, dtype=np.float64).reshape(len(names), len(episodes))

@@ -91,10 +91,10 @@ class Leaderboard:
     def standings(self) -> dict[str, Standings]:
         """Standings by measure: each kind of task, each way, and all tasks if there are several."""
         tasks = self.suite.tasks
-        wanted = measures(tasks)
-        if len(wanted) > 1:
-            wanted.append(pooled_measure(tasks))
-        return {measure.name: self.standings_of(measure) for measure in wanted}
+        listed = measures(tasks)
+        if len(listed) > 1:
+            listed.append(pooled_measure(tasks))
+        return {measure.name: self.standings_of(measure) for measure in listed}
 
     @property
     def shown(self) -> list[Standings]:
@@ -128,8 +128,8 @@ class Leaderboard:
     def whole(self, standings: Standings) -> bool:
         """Return whether a measure's standings use all of its cases."""
         tasks = standings.errors.measure.tasks
-        wanted = sum(episode.task in tasks for episode in self.suite.episodes)
-        return len(standings.errors.episodes) == wanted and bool(standings.errors.names)
+        planned = sum(episode.task in tasks for episode in self.suite.episodes)
+        return len(standings.errors.episodes) == planned and bool(standings.errors.names)
 
     @cached_property
     def verdicts(self) -> list[Verdict]:
@@ -164,7 +164,7 @@ class Leaderboard:
     def incomplete(self) -> list[tuple[Entry, int, int]]:
         """Controllers with some of their rows, how many, and of how many."""
         counts = [(entry, *self.record.done(entry)) for entry in self.record.entries]
-        return [(entry, done, wanted) for entry, done, wanted in counts if 0 < done < wanted]
+        return [(entry, done, planned) for entry, done, planned in counts if 0 < done < planned]
 
     @cached_property
     def obstacles(self) -> dict[tuple[str, float], str]:

@@ -234,8 +234,8 @@ def load_step(loop: Loop, duration: float) -> tuple[NDArray, NDArray]:
 
     The law says nothing about that volt: a load that the motor could have made.
     """
-    held: Any = control.feedback(1, loop.plant * loop.law)
-    return _step(held * loop.load, duration)
+    closed_loop: Any = control.feedback(1, loop.plant * loop.law)
+    return _step(closed_loop * loop.load, duration)
 
 
 def _step(system: Any, duration: float) -> tuple[NDArray, NDArray]:  # noqa: ANN401

@@ -141,8 +141,8 @@ def _opening(leaderboard: Leaderboard) -> list[Block]:
 def incomplete_counts(leaderboard: Leaderboard) -> str:
     """Controllers that have some of their cases, each with how many of how many; may be empty."""
     return ", ".join(
-        f"{leaderboard.labels[entry.spec.name]} ({done} of {wanted} cases)"
-        for entry, done, wanted in leaderboard.incomplete
+        f"{leaderboard.labels[entry.spec.name]} ({done} of {planned} cases)"
+        for entry, done, planned in leaderboard.incomplete
     )
 
 

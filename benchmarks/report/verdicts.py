@@ -93,12 +93,12 @@ def _of_one(
     bound: Bound,
 ) -> Verdict:
     """A target of one controller."""
-    words = {
+    meanings = {
         "largest": "largest mean error at a pressure",
         "above_bound": "largest mean error above the achievable bound",
         "to_bound": "interquartile mean over the oracle's",
     }
-    what = f"{labels.get(name, name)}, {target.measure}: {words[target.figure]}"
+    what = f"{labels.get(name, name)}, {target.measure}: {meanings[target.figure]}"
     if standings is None or name not in standings.errors.names:
         return Verdict(what, target.most, None)
     if target.figure == "to_bound":

@@ -114,11 +114,11 @@ def table_angle(pressure_kpa: float) -> TableAngle:
     table = load_table("I3").where(pressure_nominal_kpa=pressure_kpa)
     volts = np.unique(table["motor_voltage_v"])
     angles = np.array([np.mean(table.where(motor_voltage_v=v)["rotation_deg"]) for v in volts])
-    held = _rotation_profile(pressure_kpa)
-    inside = np.interp(held, [0.0, *volts], [0.0, *angles])
+    volts_at_rest = _rotation_profile(pressure_kpa)
+    inside = np.interp(volts_at_rest, [0.0, *volts], [0.0, *angles])
     last_slope = (angles[-1] - angles[-2]) / (volts[-1] - volts[-2])
-    beyond = last_slope * np.maximum(held - volts[-1], 0.0)
-    return TableAngle(float(np.mean(inside + beyond)), bool(np.mean(held) > volts[-1]))
+    beyond = last_slope * np.maximum(volts_at_rest - volts[-1], 0.0)
+    return TableAngle(float(np.mean(inside + beyond)), bool(np.mean(volts_at_rest) > volts[-1]))
 
 
 def _rotation_profile(pressure_kpa: float) -> np.ndarray:
@@ -126,8 +126,8 @@ def _rotation_profile(pressure_kpa: float) -> np.ndarray:
     for number in range(13, 21):
         table = load_table(f"I{number}")
         if float(table["pressure_kpa"][0]) == pressure_kpa:
-            held = (table["time_s"] >= 5.0) & (table["time_s"] < 10.0)
-            return table["motor_voltage_v"][held]
+            holding_phase = (table["time_s"] >= 5.0) & (table["time_s"] < 10.0)
+            return table["motor_voltage_v"][holding_phase]
     raise KeyError(f"no rotation trial at {pressure_kpa:g} kPa")
 
 

@@ -84,9 +84,9 @@ def replay_blocks(results: Results) -> list[Block]:
     for (task, phase), trials in errors.items():
         blocks += [replay_table(trials), parts_table(results, task, phase)]
     blocks.append(parts_explained())
-    held = errors.get(("rotation", "II"))
-    if held:
-        blocks += _hold_blocks(results, held)
+    phase_errors = errors.get(("rotation", "II"))
+    if phase_errors:
+        blocks += _hold_blocks(results, phase_errors)
         blocks += reading_blocks(model)
     return blocks
 

@@ -68,10 +68,10 @@ def scores_of(suite: ReproductionSuite, rows: Iterable[Row]) -> list[Score]:
     """Scores in the order of the results: models, controllers, tasks, pressures."""
     by_case = {row_identity(row): row for row in rows}
     order = {entry.spec.name: at for at, entry in enumerate(suite.entries)}
-    wanted = sorted(
+    planned = sorted(
         cases(suite, suite.entries), key=lambda case: (case.episode.station, order[case.spec.name])
     )
-    return [Score.of(case, by_case[its]) for case in wanted if (its := identity(case)) in by_case]
+    return [Score.of(case, by_case[its]) for case in planned if (its := identity(case)) in by_case]
 
 
 @dataclass(frozen=True)

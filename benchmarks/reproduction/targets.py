@@ -92,8 +92,8 @@ def _replay_checks(results: Results) -> list[Check]:
     errors = replay_errors(results, suite.models[0], "displacement", "displacement")
     if not any(controller.name == suite.goals.replay for controller in suite.controllers):
         return []
-    wanted = suite.pressures_kpa.get("displacement", ())
-    whole = not suite.selected and len(errors) == len(wanted)
+    pressures = suite.pressures_kpa.get("displacement", ())
+    whole = not suite.selected and len(errors) == len(pressures)
     got = summarise(errors).absolute if errors and whole else {}
     return [
         Check(

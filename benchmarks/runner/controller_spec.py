@@ -171,8 +171,8 @@ def _policy(item: str) -> ControllerSpec | None:
         ControllerError: the folder has no policy of that algorithm.
     """
     if item.endswith(POLICY_FILES):
-        words, _ = policy_pair(item)
-        return ControllerSpec(words.stem, path=str(words))
+        document, _ = policy_pair(item)
+        return ControllerSpec(document.stem, path=str(document))
     path, colon, algorithm = item.rpartition(":")
     if not colon or not Path(path).is_dir():
         return None

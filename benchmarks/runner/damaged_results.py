@@ -20,9 +20,9 @@ UNREADABLE = (
 
 def reason(error: BaseException) -> str:
     """An error in a few words."""
-    words = " ".join(str(error).split())
+    message = " ".join(str(error).split())
     kind = type(error).__name__
-    return words if isinstance(error, OSError | ValueError) else f"{kind}: {words}"
+    return message if isinstance(error, OSError | ValueError) else f"{kind}: {message}"
 
 
 @cache

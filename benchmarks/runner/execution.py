@@ -72,7 +72,7 @@ def pending_cases(
     """
     entries = tuple(entries)
     keys = {entry.spec.name: key(suite, entry.spec) for entry in entries}
-    wanted = tuple(cases(suite, entries))
+    planned = tuple(cases(suite, entries))
     known, outdated = dict[Identity, Row](), 0
     for row in case_rows(out / JOURNAL):
         if row.get("controller") not in keys:
@@ -82,10 +82,10 @@ def pending_cases(
         elif not row["failure"].startswith(ProcessDied.__name__):
             known[row_identity(row)] = row
     there = {
-        identity(case) for case in wanted if not traces or trace_file(case, out, traces).is_file()
+        identity(case) for case in planned if not traces or trace_file(case, out, traces).is_file()
     }
     known = {its: row for its, row in known.items() if its in there}
-    return PendingCases(suite, keys, wanted, known, outdated, traces)
+    return PendingCases(suite, keys, planned, known, outdated, traces)
 
 
 def execute(

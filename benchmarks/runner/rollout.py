@@ -66,15 +66,15 @@ class Rollout:
     @cached_property
     def trial(self) -> Trial:
         """The rollout as a trial at 384 Hz: true position, commands in force, last readings."""
-        volts, held = self.commands[self._driven], self.readings[self._step]
+        volts, readings = self.commands[self._driven], self.readings[self._step]
         return Trial(
             time=self._times,
             commands={"motor_voltage": volts[:, 0], "regulator_voltage": volts[:, 1]},
             measurements={
-                "contraction": self.start - held[:, 0],
-                "rotation": held[:, 1],
-                "load": held[:, 2],
-                "pressure": held[:, 3],
+                "contraction": self.start - readings[:, 0],
+                "rotation": readings[:, 1],
+                "load": readings[:, 2],
+                "pressure": readings[:, 3],
             },
             truth={self.task.schedule.quantity: self.position + self._zero},
         )

@@ -142,20 +142,20 @@ def plain_progress(console: Console, done: int, total: int) -> Iterator[Callable
 
 def _greeting(todo: PendingCases, entries: Sequence[Entry], out: Path, jobs: int) -> str:
     suite, done = todo.suite, len(todo.known)
-    words = (
+    text = (
         f"Suite {suite.name} version {suite.version}: {len(suite.stations)} stations, "
         f"{len(suite.episodes)} episodes, {len(entries)} controllers: {len(todo.cases)} cases, "
         f"{jobs} at a time"
     )
     if done:
-        words += f"\n{done} cases are done in {out / JOURNAL} and used again"
+        text += f"\n{done} cases are done in {out / JOURNAL} and used again"
     if todo.outdated:
-        words += (
+        text += (
             f"\n{todo.outdated} rows in {out / JOURNAL} were made with other options, other "
             "code or another file of these controllers; they stay there, are not used, and their "
             "cases run anew. The report in this folder is replaced; --out names another folder"
         )
-    return words
+    return text
 
 
 def _progress(console: Console) -> Progress:
@@ -173,13 +173,13 @@ def _bars(
     progress: Progress, todo: PendingCases, entries: Sequence[Entry]
 ) -> Callable[[Row], None]:
     """A bar for each controller and one for all, which rows move on."""
-    wanted = Counter(case.spec.name for case in todo.cases)
+    counts = Counter(case.spec.name for case in todo.cases)
     done = Counter(name for name, _ in todo.known)
     failures = Counter[str]()
     bars = {
         entry.spec.name: progress.add_task(
             entry.spec.label,
-            total=wanted[entry.spec.name],
+            total=counts[entry.spec.name],
             completed=done[entry.spec.name],
             failed="",
         )
@@ -190,8 +190,8 @@ def _bars(
     def advance(row: Row) -> None:
         name = row["controller"]
         failures[name] += bool(row["failure"])
-        words = f"{failures[name]} failed" if failures[name] else ""
-        progress.update(bars[name], advance=1, failed=words)
+        text = f"{failures[name]} failed" if failures[name] else ""
+        progress.update(bars[name], advance=1, failed=text)
         progress.update(whole, advance=1)
 
     return advance

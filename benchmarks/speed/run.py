@@ -187,8 +187,8 @@ def measure(row: Row, seconds: float) -> float:
     except subprocess.TimeoutExpired:
         raise Absent(f"took longer than {LONGEST_S:g} s") from None
     if done.returncode:
-        words = done.stderr.strip().splitlines()[-1:]
-        raise Absent(": ".join([f"its process ended with exit code {done.returncode}", *words]))
+        last_line = done.stderr.strip().splitlines()[-1:]
+        raise Absent(": ".join([f"its process ended with exit code {done.returncode}", *last_line]))
     answer = json.loads(done.stdout.splitlines()[-1])
     return answer["steps"] / answer["seconds"]
 

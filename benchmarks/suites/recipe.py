@@ -84,12 +84,12 @@ def _occasional(table: Mapping[str, Any]) -> Occasional:
         raise RecipeError(f"no effect {name!r} that a station may have or not; see the catalogue")
     ranges = {file_key: tuple(ends) for file_key, ends in table["ranges"].items()}
     tied = {file_key: (tie["to"], tie["factor"]) for file_key, tie in table.get("tied", {}).items()}
-    wanted, given_here = CATALOGUE[name].names_in_files(), [*ranges, *tied]
+    names, given_here = CATALOGUE[name].names_in_files(), [*ranges, *tied]
     # What has a default in model files has it here: it is not drawn.
-    needed = [d for d in wanted if d in given_here or d not in CATALOGUE[name].defaults]
+    needed = [d for d in names if d in given_here or d not in CATALOGUE[name].defaults]
     if sorted(given_here) != sorted(needed) or any(to not in ranges for to, _ in tied.values()):
         spare = ", ".join(CATALOGUE[name].defaults)
-        needs = ", ".join(d for d in wanted if d not in CATALOGUE[name].defaults)
+        needs = ", ".join(d for d in names if d not in CATALOGUE[name].defaults)
         needs += f"; {spare} may be left out" if spare else ""
         raise RecipeError(f"{name} needs a range or a tie for each of {needs}")
     if not 0.0 <= share <= 1.0:
@@ -100,5 +100,5 @@ def _occasional(table: Mapping[str, Any]) -> Occasional:
                 f"the range of {name}.{file_key} must be [lowest, highest], got {ends}"
             )
         for end in ends:
-            CATALOGUE[name].quantities[wanted[file_key]].check(f"{name}.{file_key}", end)
+            CATALOGUE[name].quantities[names[file_key]].check(f"{name}.{file_key}", end)
     return Occasional(name, share, ranges, tied)

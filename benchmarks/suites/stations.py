@@ -82,14 +82,14 @@ def _ramp(plant: Plant, load: float, pressure: float, end_v: float) -> Ramp:
     motor = (load - drive.offset) / drive.gain if load else 0.0
     rest = plant.settle(motor, regulator_voltage=regulator)
     start = float(rest.state[plant.states.index("contraction")])
-    time, held = np.linspace(0.0, RAMP_S, SAMPLES), np.ones(SAMPLES)
+    time, ones = np.linspace(0.0, RAMP_S, SAMPLES), np.ones(SAMPLES)
     if load:
         states, zero = plant.run(
-            time, motor * held, np.linspace(regulator, end_v, SAMPLES), condition=rest
+            time, motor * ones, np.linspace(regulator, end_v, SAMPLES), condition=rest
         )
     else:
         states, zero = plant.run(
-            time, np.linspace(0.0, end_v, SAMPLES), regulator * held, condition=rest
+            time, np.linspace(0.0, end_v, SAMPLES), regulator * ones, condition=rest
         )
     return plant.observe(states, zero), start
 

@@ -34,7 +34,7 @@ def chosen(names: Iterable[str], only: str) -> list[str]:
         ValueError: a pattern matches nothing.
     """
     known = list(dict.fromkeys(names))
-    wanted: set[str] = set()
+    matches: set[str] = set()
     for pattern in (part.strip() for part in only.split(",")):
         matching = fnmatch.filter(known, pattern)
         if not matching:
@@ -43,8 +43,8 @@ def chosen(names: Iterable[str], only: str) -> list[str]:
             raise ValueError(
                 f"only must match a table, got {pattern!r}; tables: {', '.join(known)}{hint}"
             )
-        wanted.update(matching)
-    return [name for name in known if name in wanted]
+        matches.update(matching)
+    return [name for name in known if name in matches]
 
 
 TARGETS = {

@@ -191,8 +191,8 @@ def problems_of(controllers: Iterable[str], seed: int, only: str = "*") -> list[
     for name in names:
         _check_designable(name)
     problems = [problem for name in names for problem in _problems(name, seed)]
-    wanted = chosen((problem.table for problem in problems), only)
-    return [problem for problem in problems if problem.table in wanted]
+    tables = chosen((problem.table for problem in problems), only)
+    return [problem for problem in problems if problem.table in tables]
 
 
 def _check_designable(controller: str) -> None:

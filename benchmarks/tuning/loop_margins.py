@@ -86,10 +86,10 @@ def _contracted(
     def contraction(voltage: float) -> float:
         return float(plant.settle(motor, regulator_voltage=voltage).state[at])
 
-    wanted = contraction(first) + share * station.task.schedule.span
+    target = contraction(first) + share * station.task.schedule.span
 
     def off(voltage: float) -> float:
-        return contraction(voltage) - wanted
+        return contraction(voltage) - target
 
     voltage = float(root_scalar(off, method="brentq", bracket=(first, 10.0), xtol=1e-9).root)
     return plant.settle(motor, regulator_voltage=voltage), (motor, voltage)
@@ -113,12 +113,12 @@ def sampled(
     sensor = station.model.parameters.get(SIGNALS[quantity].sensor)
     if sensor is not None:
         one = control.tf([1.0], [1.0 / (2.0 * math.pi * sensor.bandwidth), 1.0]) * one
-    held: Any = control.ss(control.sample_system(one, station.period, method="zoh"))
+    discrete: Any = control.ss(control.sample_system(one, station.period, method="zoh"))
     steps = round((station.action_delay + station.observation_delay) / station.period)
     if steps:
         # In a chain of states: a fraction with 1 / z^n is ill-conditioned.
-        return held * _late(steps, station.period)
-    return held
+        return discrete * _late(steps, station.period)
+    return discrete
 
 
 def _late(steps: int, period: float) -> Any:  # noqa: ANN401

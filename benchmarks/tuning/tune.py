@@ -145,8 +145,8 @@ def table_rows(model: Model, seed: int, only: str) -> list[Job]:
         for controller in CONTROLLERS
         for pressure in pressures
     ]
-    wanted = chosen((f"{row.loop}/{row.kind}" for row in rows), only)
-    return [row for row in rows if f"{row.loop}/{row.kind}" in wanted]
+    tables = chosen((f"{row.loop}/{row.kind}" for row in rows), only)
+    return [row for row in rows if f"{row.loop}/{row.kind}" in tables]
 
 
 def _interrupted(done: int, total: int, kept: Path, out: Path) -> str:

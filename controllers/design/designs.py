@@ -154,9 +154,9 @@ def loop_name(station: StationInfo) -> str:
     return f"{1.0 / station.period:g}hz" + (f"_delay{delay:g}ms" if delay else "")
 
 
-def nearest_loop(wanted: str, known: list[str]) -> str:
+def nearest_loop(loop: str, known: list[str]) -> str:
     """The loop whose dead time, a period and the delay, is nearest as a ratio; the first of two."""
-    return min(known, key=lambda name: abs(math.log(_dead_time(name) / _dead_time(wanted))))
+    return min(known, key=lambda name: abs(math.log(_dead_time(name) / _dead_time(loop))))
 
 
 def _dead_time(loop: str) -> float:
@@ -238,9 +238,9 @@ class Gains(NamedTuple):
         at the end of phase III, every push that noise makes stays, for the drive cannot push
         back and nothing else does. k_p and k_d pass noise on from sample to sample.
         """
-        held = min(max(share, 0.0), 1.0)
-        end = 1.0 + (self.end_factor - 1.0) * held * held
-        start = 1.0 + (self.start_factor - 1.0) * max(0.0, 1.0 - held / START_SHARE)
+        clipped = min(max(share, 0.0), 1.0)
+        end = 1.0 + (self.end_factor - 1.0) * clipped * clipped
+        start = 1.0 + (self.start_factor - 1.0) * max(0.0, 1.0 - clipped / START_SHARE)
         return self._replace(
             proportional=end * start * self.proportional,
             integral=end * math.sqrt(start) * self.integral,

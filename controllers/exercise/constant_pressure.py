@@ -59,9 +59,9 @@ class ConstantPressure:
 def nearest_pressure(station: StationInfo, exercise: "Exercise") -> float:
     """Pressure (Pa) whose moments miss a prescription least over 0-90 deg, in the mean square."""
     assert exercise.prescription is not None
-    wanted = np.array([exercise.prescription.at(angle) for angle in ANGLES.tolist()])
+    prescribed = np.array([exercise.prescription.at(angle) for angle in ANGLES.tolist()])
     moments = Resistance(station).moments
     fine = np.arange(PRESSURES[0], PRESSURES[-1], 1e3)
     available = np.array([np.interp(fine, PRESSURES, column) for column in moments.T])
-    missed = np.mean((available - wanted[:, None]) ** 2, axis=0)
+    missed = np.mean((available - prescribed[:, None]) ** 2, axis=0)
     return float(fine[np.argmin(missed)])

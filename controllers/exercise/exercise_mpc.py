@@ -141,7 +141,7 @@ class ExerciseMPC:
         times = station.period * np.arange(steps, dtype=np.float64)
         self._expected = self.settings.expected * expected_moment(station, self._device, times)
         if self._prescription is None:
-            self._wanted = np.array([reference(time) for time in times.tolist()])
+            self._targets = np.array([reference(time) for time in times.tolist()])
         else:
             angles = self._prescription.angles
             self._knots = angles, [self._prescription.at(angle) for angle in angles]
@@ -181,7 +181,7 @@ class ExerciseMPC:
         predicted = program.state @ state + program.drift @ drift + program.past @ past
         angles = angle + predicted[0]
         if self._prescription is None:
-            return angles - self._wanted[now + stride : last + 1 : stride]
+            return angles - self._targets[now + stride : last + 1 : stride]
         return moment + predicted[1] - np.interp(angles, *self._knots)
 
     def _programmed(self, stiffness: float, pressure: float) -> Program:

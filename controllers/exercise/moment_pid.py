@@ -84,7 +84,7 @@ class MomentPID:
         coming = angle + gains.lead * self._speed.update(measurement)
         pressure = float(np.interp(coming, ANGLES, self._schedule))
         pressure -= moment / self._device.at(measurement.pressure, angle).influence
-        if not self._arrival.held(measurement.pressure, -over):
+        if not self._arrival.is_saturated(measurement.pressure, -over):
             self._sum += gains.integral * self._period * over
         self._arrival.command(pressure)
         return self._volts(pressure)

@@ -154,7 +154,7 @@ class Arrival:
         reached = min(max(pressure, self._lowest), self._highest)
         self._believed = reached + self._kept * (self._believed - reached)
 
-    def held(self, pressure: float, rise: float) -> bool:
+    def is_saturated(self, pressure: float, rise: float) -> bool:
         """Whether a change of the command in this direction has no effect on the pressure.
 
         Args:
@@ -182,9 +182,9 @@ def volts_of(station: StationInfo) -> Callable[[float], float]:
 
 def _place(at: float, count: int) -> tuple[int, float]:
     """Cell of a place on an even grid, and the share of the cell; held to the grid."""
-    held = min(max(at, 0.0), count - 1.0)
-    cell = min(int(held), count - 2)
-    return cell, held - cell
+    clipped = min(max(at, 0.0), count - 1.0)
+    cell = min(int(clipped), count - 2)
+    return cell, clipped - cell
 
 
 def _table(station: StationInfo, start_moment: float) -> NDArray[np.float64]:

@@ -44,6 +44,6 @@ def schedule(station: StationInfo) -> np.ndarray:
     """
     exercise, model = station.task.exercise, station.model
     assert exercise is not None and exercise.prescription is not None
-    wanted = np.array([exercise.prescription.at(angle) for angle in ANGLES.tolist()])
+    prescribed = np.array([exercise.prescription.at(angle) for angle in ANGLES.tolist()])
     start = station.pressure, exercise.start_moment
-    return follow_from(model, own_device(model), ANGLES, wanted, *start).pressure
+    return follow_from(model, own_device(model), ANGLES, prescribed, *start).pressure

@@ -74,14 +74,14 @@ class SpeedPID:
     def act(self, measurement: Measurement, time: float) -> float:
         """Regulator voltage (V)."""
         gains, due = self.gains, time + self._ahead
-        wanted = self._reference(due)
-        slow = (self._reference(due + self._period) - wanted) / self._period
+        target = self._reference(due)
+        slow = (self._reference(due + self._period) - target) / self._period
         slow -= self._speed.update(measurement)
-        behind = wanted - measurement.rotation
+        behind = target - measurement.rotation
         moment = gains.speed * slow + gains.angle * behind + self._sum
         local = self._device.at(measurement.pressure, measurement.rotation)
         pressure = self._first - moment / local.influence
-        if not self._arrival.held(measurement.pressure, -behind):
+        if not self._arrival.is_saturated(measurement.pressure, -behind):
             self._sum += gains.sum * self._period * behind
         self._arrival.command(pressure)
         return self._volts(pressure)

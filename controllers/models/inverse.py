@@ -129,10 +129,10 @@ class ContractionInverse:
         """Into how many steps a control period is divided: memories need short ones."""
         return max(1, math.ceil(period / 2e-3 - 1e-9))
 
-    def along(self, wanted: np.ndarray, station: StationInfo) -> np.ndarray:
+    def along(self, target: np.ndarray, station: StationInfo) -> np.ndarray:
         """Regulator voltage (V) of every control period of a motion, shape (steps,)."""
         parts = self.parts(station.period)
-        needed = self.pressures(wanted, station, station.period / parts)
+        needed = self.pressures(target, station, station.period / parts)
         after, before = np.append(needed, needed[-1])[::parts], needed[parts - 1 :: parts]
         # Where a speed changes at a period's end, so does the pressure: by half before it.
         ends = np.append(station.pressure, 0.5 * (before + after[1:]))
@@ -142,11 +142,11 @@ class ContractionInverse:
         asked = start + change / -np.expm1(-pace * station.period)
         return (asked - self.line.offset) / self.line.gain
 
-    def pressures(self, wanted: np.ndarray, station: StationInfo, step: float) -> np.ndarray:
+    def pressures(self, target: np.ndarray, station: StationInfo, step: float) -> np.ndarray:
         """Pressure (Pa) in the middle of every step of a motion, shape (n,).
 
         Args:
-            wanted: contraction from the start at the nodes (m), shape (n + 1,).
+            target: contraction from the start at the nodes (m), shape (n + 1,).
             station: its pressure at the start and its load.
             step: time between nodes (s).
         """
@@ -154,7 +154,7 @@ class ContractionInverse:
         muscle = Muscle(self.plant, self.plant.settle(motor, pressure=station.pressure))
         begin = muscle.zero - float(muscle.state[self.plant.states.index("contraction")])
         pressures, pressure = [], station.pressure
-        middles, speeds = 0.5 * (wanted[1:] + wanted[:-1]), np.diff(wanted) / step
+        middles, speeds = 0.5 * (target[1:] + target[:-1]), np.diff(target) / step
         for contraction, speed in zip(middles.tolist(), speeds.tolist(), strict=True):
             motion = begin - contraction, -speed
             above = muscle.tension_at(pressure + PROBE_PA, *motion)
@@ -190,11 +190,11 @@ class Inverse(Protocol):
         """Into how many steps a control period (s) is divided."""
         ...
 
-    def along(self, wanted: np.ndarray, station: StationInfo) -> np.ndarray:
+    def along(self, target: np.ndarray, station: StationInfo) -> np.ndarray:
         """Voltage (V) of every control period of a motion.
 
         Args:
-            wanted: positions (m or rad) at the ends of all parts, shape (steps * parts + 1,).
+            target: positions (m or rad) at the ends of all parts, shape (steps * parts + 1,).
             station: task, pressure, control period, action delay.
         Returns:
             Shape (steps,). Not held to 0-10 V: beyond says by how much the motion asks for what
@@ -229,42 +229,44 @@ class StationInverse:
         """Into how many steps a control period (s) is divided."""
         return max(1, math.ceil(period / STEP_S - 1e-9))
 
-    def along(self, wanted: np.ndarray, station: StationInfo) -> np.ndarray:
+    def along(self, target: np.ndarray, station: StationInfo) -> np.ndarray:
         """Motor voltage (V) of every control period of a motion, shape (steps,)."""
         parts = self.parts(station.period)
         rotation = station.task.schedule.followed.is_angle
-        tension, extension = self.follow(wanted, station.period / parts, station.pressure, rotation)
-        wound = self.rotor.radius * wanted if rotation else extension
+        tension, extension = self.follow(target, station.period / parts, station.pressure, rotation)
+        wound = self.rotor.radius * target if rotation else extension
         load = self._mean_load(tension, extension, wound, station.period, parts)
         if not rotation:
             self._take_up_slack(load, station)
         return (load - self.drive.offset) / self.drive.gain
 
     def follow(
-        self, wanted: np.ndarray, step: float, pressure: float, rotation: bool
+        self, path: np.ndarray, step: float, pressure: float, rotation: bool
     ) -> tuple[np.ndarray, np.ndarray]:
         """Tension and extension along a motion.
 
         Args:
-            wanted: extension (m) or rotation (rad) at the nodes, shape (n + 1,).
+            path: extension (m) or rotation (rad) at the nodes, shape (n + 1,).
             step: time between nodes (s).
             pressure: gauge pressure (Pa).
-            rotation: whether `wanted` is one.
+            rotation: whether `path` is one.
         Returns:
             Tension without inertia in the steps (N), shape (n,), negative where the cable would
             have to push; extension at the nodes (m), shape (n + 1,).
         """
         muscle = Muscle(self.plant, self.plant.settle(0.0, pressure=pressure))
-        tension, extension = np.zeros(len(wanted) - 1), np.zeros(len(wanted))
+        tension, extension = np.zeros(len(path) - 1), np.zeros(len(path))
         for i in range(len(tension)):
-            start, target = extension[i], wanted[i + 1]
+            start, target = extension[i], path[i + 1]
             if rotation:
                 target = self._pulled_to(self.rotor.radius * target, muscle, start, step)
             pull = muscle.tension(0.5 * (target + start), (target - start) / step)
             if pull < 0.0:
                 # The cable cannot push: it hangs loose, and the muscle goes back as it does alone.
-                held = muscle.tension(start, 0.0)
-                target = start + (target - start) * max(held, 0.0) / (max(held, 0.0) - pull)
+                start_tension = muscle.tension(start, 0.0)
+                target = start + (target - start) * max(start_tension, 0.0) / (
+                    max(start_tension, 0.0) - pull
+                )
             muscle.remember(0.5 * (target + start), (target - start) / step, step)
             tension[i], extension[i + 1] = pull, target
         return tension, extension
@@ -332,9 +334,9 @@ class CascadeInverse:
         """Into how many steps a control period is divided: its middle is asked for."""
         return 2
 
-    def along(self, wanted: np.ndarray, station: StationInfo) -> np.ndarray:
+    def along(self, target: np.ndarray, station: StationInfo) -> np.ndarray:
         """Motor voltage (V) of every control period of a motion, from its middle."""
-        ends, middle = wanted[::2], wanted[1::2]
+        ends, middle = target[::2], target[1::2]
         if station.task.schedule.followed.is_angle:
             return self._mapped(self.parameters["servo"].radius * middle, station.pressure)
         rate = np.diff(ends) / station.period

@@ -78,13 +78,13 @@ class LinearMotion(NamedTuple):
 
 
 def linear_motion(
-    needed: np.ndarray, wanted: np.ndarray, station: StationInfo, beyond: int
+    needed: np.ndarray, target: np.ndarray, station: StationInfo, beyond: int
 ) -> LinearMotion:
     """The nominal motion under the feed-forward's voltages, and the plant near it.
 
     Args:
         needed: voltage that should be in force in every period of the trial (V), shape (trial,).
-        wanted: reference at the periods' ends (m or rad), shape (trial + 1,).
+        target: reference at the periods' ends (m or rad), shape (trial + 1,).
         station: nominal model, task, pressure, control period.
         beyond: periods after the trial's end for which the last voltage is held.
     """
@@ -92,10 +92,10 @@ def linear_motion(
     moved_by_motor = task.actuator == "motor"
     idle = _idle_voltage(station) if moved_by_motor else 0.0
     volts = np.clip(np.append(needed, np.full(beyond, needed[-1])), idle, VOLTAGE_LIMIT)
-    held = motor_at_rest(station.model, task), plant.regulator_voltage(station.pressure)
-    motor, regulator = (np.full(len(volts), voltage) for voltage in held)
+    rest_voltages = motor_at_rest(station.model, task), plant.regulator_voltage(station.pressure)
+    motor, regulator = (np.full(len(volts), voltage) for voltage in rest_voltages)
     commands = (volts, regulator) if moved_by_motor else (motor, volts)
-    rest = plant.settle(held[0], regulator_voltage=held[1])
+    rest = plant.settle(rest_voltages[0], regulator_voltage=rest_voltages[1])
     times = station.period * np.arange(len(volts) + 1)
     states, zero = plant.run(
         times, *(np.append(one, one[-1]) for one in commands), interpolation="zoh", condition=rest
@@ -103,7 +103,7 @@ def linear_motion(
     truth = plant.observe(states, zero)
     start = truth["contraction"][0]
     position = truth[task.schedule.quantity] - (start if task.load else 0.0)
-    error = np.append(position[: len(wanted)] - wanted, np.zeros(beyond))
+    error = np.append(position[: len(target)] - target, np.zeros(beyond))
     readings = plant.lagged(states, truth)
     readings[:, 0] = start - readings[:, 0]
     readings[:, 1] -= readings[0, 1]

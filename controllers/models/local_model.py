@@ -134,7 +134,7 @@ def stroke_models(
     forms = [[observer_form(_reduced(one, order)) for one in row] for row in sampled]
     coefficients = np.mean(forms, axis=0)
     slopes = [_pressure_slope(system, quantity, actuator) for system in systems[0]]
-    held = [commands[0 if actuator == "motor" else 1] for _, commands in rests]
+    volts = [commands[0 if actuator == "motor" else 1] for _, commands in rests]
     fine = np.linspace(positions[0], positions[-1], FINE)
 
     def mixed(column: Sequence[float]) -> list[float]:
@@ -143,7 +143,7 @@ def stroke_models(
     rows = np.transpose([mixed(column) for column in coefficients.T])
     models = tuple(_local(row, period) for row in rows)
     ends = float(fine[0]), float(fine[-1])
-    return Stroke(*ends, models, tuple(mixed(held)), tuple(mixed(slopes)))
+    return Stroke(*ends, models, tuple(mixed(volts)), tuple(mixed(slopes)))
 
 
 def _pressure_slope(system: "control.StateSpace", quantity: str, actuator: str) -> float:
@@ -178,8 +178,8 @@ def _rests(
 
     begin = float(rest(np.array([commands[0] if motor else commands[1]]))[2][0])
     searched = np.linspace(0.0, VOLTAGE_LIMIT, _SEARCHED)
-    held = _rising(rest(searched)[2] - begin, lowest=0.0 if motor else -np.inf)
-    volts, rests = searched[held[0]], held[1]
+    rising = _rising(rest(searched)[2] - begin, lowest=0.0 if motor else -np.inf)
+    volts, rests = searched[rising[0]], rising[1]
     low = max(reach[0], float(rests[0]))
     places = np.linspace(low, min(reach[1], float(rests[-1])), PLACES)
     volts = np.interp(places, rests, volts)

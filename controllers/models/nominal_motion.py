@@ -27,38 +27,38 @@ SLOWEST = 0.5
 """Least speed planned, in ranges a second: near the cable's slack hardly anything drives back."""
 
 
-def jumps(wanted: np.ndarray, span: float) -> np.ndarray:
+def jumps(target: np.ndarray, span: float) -> np.ndarray:
     """Indices of nodes after which a reference jumps.
 
     Args:
-        wanted: the reference at the nodes (m or rad), shape (n,).
+        target: the reference at the nodes (m or rad), shape (n,).
         span: range of the task (m or rad).
     """
-    return np.flatnonzero(np.abs(np.diff(wanted)) > JUMP_SHARE * span)
+    return np.flatnonzero(np.abs(np.diff(target)) > JUMP_SHARE * span)
 
 
-def begun_late(wanted: np.ndarray, first: int) -> np.ndarray:
+def delayed_start(target: np.ndarray, first: int) -> np.ndarray:
     """The reference, but at rest up to a node: no command is in force before."""
-    planned = wanted.copy()
-    planned[: first + 1] = wanted[0]
+    planned = target.copy()
+    planned[: first + 1] = target[0]
     return planned
 
 
 def without_jumps(
-    wanted: np.ndarray, first: int, step: float, stroke: Stroke, span: float
+    target: np.ndarray, first: int, step: float, stroke: Stroke, span: float
 ) -> np.ndarray:
     """The reference with ways in place of its jumps.
 
     Args:
-        wanted: the reference at the nodes (m or rad), shape (n,).
+        target: the reference at the nodes (m or rad), shape (n,).
         first: the first node from which the plant can be moved.
         step: time between nodes (s).
         stroke: how the plant answers along the stroke.
         span: range of the task (m or rad).
     """
-    planned = wanted.copy()
-    for at in jumps(wanted, span).tolist():
-        way = _way(float(wanted[at]), float(wanted[at + 1]), step, stroke, SLOWEST * span)
+    planned = target.copy()
+    for at in jumps(target, span).tolist():
+        way = _way(float(target[at]), float(target[at + 1]), step, stroke, SLOWEST * span)
         start = max(at + 1 - len(way) // 2, first)
         part = planned[start : start + len(way)]
         part[:] = way[: len(part)]
@@ -70,8 +70,8 @@ def _way(start: float, end: float, step: float, stroke: Stroke, slowest: float) 
     up, way = end > start, [start]
     while (way[-1] < end) == up:
         at = stroke.nearest(way[-1])
-        local, held = stroke.models[at], stroke.volts[at]
-        left = VOLTAGE_LIMIT - held if up else held
+        local, volts = stroke.models[at], stroke.volts[at]
+        left = VOLTAGE_LIMIT - volts if up else volts
         speed = max(DRIVEN_SHARE * local.gain / local.time_constant * left, slowest)
         way.append(way[-1] + (speed if up else -speed) * step)
     way[-1] = end
@@ -103,12 +103,14 @@ def nominal_rollout(station: StationInfo, volts: np.ndarray) -> np.ndarray:
     """
     plant, (motor, regulator) = Plant(station.model), rest_voltages(station)
     moves_regulator = station.task.actuator == "regulator"
-    held = np.clip(np.append(volts, volts[-1]), 0.0, VOLTAGE_LIMIT)
-    held[: round(station.action_delay / station.period)] = regulator if moves_regulator else motor
-    other = np.full(len(held), motor if moves_regulator else regulator)
-    commands = (other, held) if moves_regulator else (held, other)
+    commanded = np.clip(np.append(volts, volts[-1]), 0.0, VOLTAGE_LIMIT)
+    commanded[: round(station.action_delay / station.period)] = (
+        regulator if moves_regulator else motor
+    )
+    other = np.full(len(commanded), motor if moves_regulator else regulator)
+    commands = (other, commanded) if moves_regulator else (commanded, other)
     start = plant.settle(motor, regulator_voltage=regulator)
-    times = station.period * np.arange(len(held))
+    times = station.period * np.arange(len(commanded))
     states, zero = plant.run(times, *commands, interpolation="zoh", condition=start)
     said = plant.lagged(states, plant.observe(states, zero))
     measured = said[:, [plant.outputs.index(n) for n in ("contraction", "rotation", "load")]].T
@@ -124,7 +126,7 @@ def position_of(station: StationInfo, said: np.ndarray) -> np.ndarray:
 
 
 def improved(
-    station: StationInfo, volts: np.ndarray, wanted: np.ndarray, stroke: Stroke
+    station: StationInfo, volts: np.ndarray, target: np.ndarray, stroke: Stroke
 ) -> np.ndarray:
     """Voltages after some rollouts, in each of which errors that stay are learned from.
 
@@ -138,17 +140,17 @@ def improved(
     Args:
         station: as of `nominal_rollout`.
         volts: to begin with (V), shape (steps,).
-        wanted: planned position at control instants, as its sensor would say (m or rad), shape
+        target: planned position at control instants, as its sensor would say (m or rad), shape
             (steps + 1,).
         stroke: how the plant answers.
     """
-    places = [stroke.nearest(position) for position in wanted[1:].tolist()]
+    places = [stroke.nearest(position) for position in target[1:].tolist()]
     gains = np.array([stroke.models[place].gain for place in places])
     window = np.hanning(2 * round(0.5 * WINDOW_S / station.period) + 3)
     pulls = "cable" in station.model.parameters
     for _ in range(REPETITIONS):
         said = nominal_rollout(station, volts)
-        error = wanted - position_of(station, said)
+        error = target - position_of(station, said)
         possible = (volts >= 0.0) & (volts <= VOLTAGE_LIMIT)
         if pulls:
             possible &= said[2, 1:] > LEAST_LOAD_N
@@ -284,7 +286,7 @@ def nominal_motion(reference: Reference, station: StationInfo) -> NominalMotion:
     inverse = _inverse(ModelKey(station.model), station.task.actuator)
     parts, span = inverse.parts(station.period), station.task.schedule.span
     step, first = station.period / parts, round(parts * station.action_delay / station.period)
-    planned = begun_late(_sampled(reference, station, parts), first)
+    planned = delayed_start(_sampled(reference, station, parts), first)
     if len(jumps(planned, span)):
         stroke = stroke_along(planned, station)
         planned = without_jumps(planned, first, step, stroke, span)
@@ -335,7 +337,7 @@ def _voltages(inverse: Inverse, aim: _Aim) -> np.ndarray:
     lag, _ = sensor_of(station, station.task.schedule.quantity)
     instants = station.period * np.arange(len(volts) + 1)
     nodes = station.period / parts * np.arange(len(planned))
-    wanted = np.interp(instants - lag, nodes, planned)
-    volts = improved(station, volts, wanted, stroke_along(planned, station))
+    target = np.interp(instants - lag, nodes, planned)
+    volts = improved(station, volts, target, stroke_along(planned, station))
     volts.flags.writeable = False
     return volts

@@ -167,13 +167,13 @@ class DeviationFilter:
         if self._line is not None:
             return -self._pressure.excess / self._line.gain
         ahead = (k + 0.5 - self._taken) * self._period
-        return self._held(k, self._pressure.ahead(ahead, self._station.pressure))
+        return self._holding_voltage(k, self._pressure.ahead(ahead, self._station.pressure))
 
     def nominal(self, k: int) -> float:
         """Voltage (V) of the nominal motion that can be in force in a period."""
         return self._plan.volts[min(k, len(self._plan.volts) - 1)]
 
-    def held(self, k: int) -> float:
+    def holding_voltage(self, k: int) -> float:
         """Voltage H (V) that holds the nominal plant where it is planned to be in a period.
 
         Beside what held it at the start, where the trial began settled.
@@ -190,7 +190,7 @@ class DeviationFilter:
             return self._station.pressure
         return self._line.gain * voltage + self._line.offset
 
-    def _held(self, k: int, pressure: float) -> float:
+    def _holding_voltage(self, k: int, pressure: float) -> float:
         """Voltage (V) by which a motor has to hold against a pressure (Pa)."""
         if self.cable.loose:
             return 0.0
@@ -201,7 +201,7 @@ class DeviationFilter:
         if self._free is not None and not self.cable.tightened:
             return self._free
         n, system = self.order, self._systems[self.place(k)]
-        system.whole[:n, n + 1] = self.held(k) * system.push[:n]
+        system.whole[:n, n + 1] = self.holding_voltage(k) * system.push[:n]
         return system
 
     def _moved(self, state: np.ndarray, k: int, sent: float, known: float) -> np.ndarray:
@@ -216,7 +216,7 @@ class DeviationFilter:
     def _advance(self, pressure: float) -> None:
         """Let a control period pass, in which the pressure (Pa) was this."""
         k, sent = self._taken, self._sent.popleft()
-        known = self.correction(k) if self._line is not None else self._held(k, pressure)
+        known = self.correction(k) if self._line is not None else self._holding_voltage(k, pressure)
         whole, push = self._system(k)
         alone = self.alone
         process_noise = (
@@ -234,7 +234,7 @@ class DeviationFilter:
         holds it there are, each, and what the plan moves it with.
         """
         n, state, at, nominal = self.order, self.estimate, self.place(k), self.nominal(k)
-        pushed = voltage - nominal + float(state[n] + state[n + 1] * self.held(k))
+        pushed = voltage - nominal + float(state[n] + state[n + 1] * self.holding_voltage(k))
         away = float(state[0]) / self._stroke.models[at].gain
         return DOUBT**2 * (pushed**2 + away**2 + (nominal - self._stroke.volts[at]) ** 2)
 
@@ -298,7 +298,7 @@ class DeviationFilter:
         beyond = self.estimate[n + 1] - min(max(self.estimate[n + 1], -MOST_SHARE), MOST_SHARE)
         if beyond:
             self.estimate[n + 1] -= beyond
-            self.estimate[n] += beyond * self.held(self._taken)
+            self.estimate[n] += beyond * self.holding_voltage(self._taken)
 
 
 class _NominalTrajectory:

@@ -156,8 +156,8 @@ def place_of(lags: LagDeadTimeModel, period: float, delay: float, pole: float) -
     whole = int(waited / period + 1e-9)
     part = max(waited - whole * period, 0.0)
     # For how long voltages in flight have acted when one that is sent now begins to.
-    begun = [(whole - k) * period for k in range(whole + 1)]
-    spans = np.array([period, period - part, waited, *begun])
+    period_ends = [(whole - k) * period for k in range(whole + 1)]
+    spans = np.array([period, period - part, waited, *period_ends])
     step, rest, ahead, *after = expm(lags.rates * spans[:, None, None])
     driven = len(lags.constants)
     by_voltage = np.array([ahead, *after])[:, :, driven] - np.eye(len(step))[driven]
@@ -177,8 +177,8 @@ def placed(a: np.ndarray, b: np.ndarray, pole: float) -> np.ndarray:
     """K such that all poles of A - b K are `pole`: Ackermann's formula, shape (n,)."""
     n = len(b)
     reached = np.stack([np.linalg.matrix_power(a, k) @ b for k in range(n)], axis=1)
-    wanted = np.linalg.matrix_power(a - pole * np.eye(n), n)
-    return np.linalg.solve(reached.T, np.eye(n)[n - 1]) @ wanted
+    polynomial = np.linalg.matrix_power(a - pole * np.eye(n), n)
+    return np.linalg.solve(reached.T, np.eye(n)[n - 1]) @ polynomial
 
 
 class ExtendedStateObserver:
@@ -216,7 +216,7 @@ class ExtendedStateObserver:
         self._first, self._scale = stroke.first, (PLACES - 1) / (stroke.last - stroke.first)
         self._estimate = np.zeros(self.order + 2)
         self._sent = np.zeros(max(place.since for place in self.places) + 1)
-        self._begun = False
+        self._started = False
 
     def pole(self, lags: LagDeadTimeModel, bandwidth: float) -> float:
         """Sampled pole of a bandwidth in units of 1 / reaction time.
@@ -248,10 +248,10 @@ class ExtendedStateObserver:
         error = self._position(observation) - expected
         self.at = self.nearest(expected)
         place, sent, z = self.places[self.at], self._sent, self._estimate
-        if self._begun:
+        if self._started:
             z = place.step @ z + place.older * sent[-place.since - 1]
             z += place.newer * sent[-place.since]
-        self._begun = True
+        self._started = True
         z = z + place.correction * (error - z[0])
         if observation.load < self._loose:
             z[-1] = 0.0
@@ -313,7 +313,7 @@ class ObserverFeedback(ABC, Generic[Settings]):
         """Keep the motion, begin an observer and compute what the places need."""
 
     @abstractmethod
-    def _wanted(self, planned: float, z: np.ndarray) -> float:
+    def _unclipped_voltage(self, planned: float, z: np.ndarray) -> float:
         """Voltage (V), not held to limits, by that of the feed-forward (V) and z."""
 
     @abstractmethod
@@ -332,7 +332,7 @@ class ObserverFeedback(ABC, Generic[Settings]):
         """Voltage (V) of the task's actuator to hold for the next control period."""
         z = self._observer.update(measurement, time)
         planned = self._planned(time)
-        voltage = min(max(self._wanted(planned, z), 0.0), VOLTAGE_LIMIT)
+        voltage = min(max(self._unclipped_voltage(planned, z), 0.0), VOLTAGE_LIMIT)
         self._observer.send(voltage - planned)
         return voltage
 

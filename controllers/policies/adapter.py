@@ -90,7 +90,7 @@ class ActionMapping:
         """The mapping as JSON."""
         return asdict(self)
 
-    def wanted(self, action: Any, before: Any, base: Any) -> Any:  # noqa: ANN401
+    def unclipped_voltage(self, action: Any, before: Any, base: Any) -> Any:  # noqa: ANN401
         """Voltage that an action asks for (V), not yet held to 0-10 V; of numbers or arrays.
 
         Args:
@@ -201,11 +201,11 @@ class PolicyAdapter:
         """
         if not math.isfinite(action):
             raise ValueError(DIVERGED.format("", action))
-        held = min(max(action, -1.0), 1.0)
-        wanted = self.form.wanted(held, self._before, self._voltage)
-        self._before = min(max(wanted, 0.0), HIGHEST_V)
+        clipped = min(max(action, -1.0), 1.0)
+        unclipped = self.form.unclipped_voltage(clipped, self._before, self._voltage)
+        self._before = min(max(unclipped, 0.0), HIGHEST_V)
         if self.view.kind == "tracking":
-            self._actions.appendleft(held)
+            self._actions.appendleft(clipped)
             self._volts.append(self._before)
             self._volts.popleft()
         return self._before
@@ -341,12 +341,12 @@ class BatchPolicyAdapter:
         if not finite.all():
             first = int(np.argmin(finite))
             raise ValueError(DIVERGED.format(f" that of trial {first}", actions[first]))
-        held = np.clip(actions, -1.0, 1.0)
-        wanted = self.form.wanted(held, self._volts[:, 0], self._base_volts)
+        clipped = np.clip(actions, -1.0, 1.0)
+        unclipped = self.form.unclipped_voltage(clipped, self._volts[:, 0], self._base_volts)
         if self.view.history:
             self._actions[:, 1:] = self._actions[:, :-1]
-            self._actions[:, 0] = held
+            self._actions[:, 0] = clipped
         self._volts[:, 1:] = self._volts[:, :-1]
-        self._volts[:, 0] = np.clip(wanted, 0.0, HIGHEST_V)
+        self._volts[:, 0] = np.clip(unclipped, 0.0, HIGHEST_V)
         self.steps += 1
         return self._volts[:, 0].copy()

@@ -118,15 +118,15 @@ def _check_network(network: Mapping[str, Any]) -> None:
 
 
 def _check_tensors(document: Mapping[str, Any]) -> None:
-    wanted = tensor_shapes(document["network"]["layers"], bool(document["network"]["scaling"]))
+    expected = tensor_shapes(document["network"]["layers"], bool(document["network"]["scaling"]))
     tensors = document["tensors"]
     _check(isinstance(tensors, dict), "tensors", "an object of shapes by name", tensors)
     wrong = sorted(
-        name for name in set(wanted) | set(tensors) if tensors.get(name) != wanted.get(name)
+        name for name in set(expected) | set(tensors) if tensors.get(name) != expected.get(name)
     )
     for name in wrong[:1]:
         came = _short(tensors[name]) if name in tensors else "none"
-        rule = f"the shape {wanted[name]}" if name in wanted else "no place"
+        rule = f"the shape {expected[name]}" if name in expected else "no place"
         raise PolicyError(f"tensors: {name} has {rule} in network.layers, got {came}")
     digest = document["sha256"]
     hexadecimal = isinstance(digest, str) and len(digest) == 64 and set(digest) <= _HEXADECIMAL

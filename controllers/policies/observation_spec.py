@@ -63,7 +63,7 @@ class Scales:
         self.radius = parameters["rotor"].radius
         self.delay = round((station.action_delay + station.observation_delay) / station.period)
         self._gain, self._offset = parameters["drive"].gain, parameters["drive"].offset
-        self._held = station.load
+        self._constant_load = station.load
 
     def entries(self, reading: Any, reference: Any, start: Any, volts: Any) -> tuple[Any, ...]:  # noqa: ANN401
         """The four entries of a reading, before they are clipped; of numbers or arrays.
@@ -81,7 +81,7 @@ class Scales:
             own, other = -extension, -self.radius * rotation
         else:
             own, other = extension, self.radius * rotation
-        asked = self._held if self._held else self._gain * volts + self._offset
+        asked = self._constant_load if self._constant_load else self._gain * volts + self._offset
         # The drive cannot push; half the sum of a number and its size is its positive part.
         asked = 0.5 * (asked + abs(asked))
         return (

@@ -67,10 +67,10 @@ def load_policy_file(path: Path | str) -> PolicyFile:
             which and what to do.
         ImportError: safetensors is not installed; says how to install it.
     """
-    words, weights = policy_pair(path)
-    text = _read(words, weights)
-    blob = _read(weights, words)
-    return _parsed(text, blob, words)
+    document, weights = policy_pair(path)
+    text = _read(document, weights)
+    blob = _read(weights, document)
+    return _parsed(text, blob, document)
 
 
 def save_policy_file(policy: PolicyFile, path: Path | str) -> Path:
@@ -85,18 +85,18 @@ def save_policy_file(policy: PolicyFile, path: Path | str) -> Path:
         PolicyError: a policy that would not load.
         OSError: a folder or disk that cannot be written; the old pair is as it was.
     """
-    words, weights = policy_pair(path)
+    document_path, weights = policy_pair(path)
     try:
         check_chain(policy.weights)
         tensors = tensors_of(policy.weights)
         blob = safetensors().save(tensors)
         text = json.dumps(_document(policy, tensors, blob), indent=1, allow_nan=False) + "\n"
     except (TypeError, ValueError) as error:
-        raise PolicyError(f"{words} cannot be written: {error}") from None
-    _parsed(text.encode(), blob, words)
+        raise PolicyError(f"{document_path} cannot be written: {error}") from None
+    _parsed(text.encode(), blob, document_path)
     # Words last: should the machine stop between the two, their digest refuses the new weights.
-    replace_files({weights: blob, words: text.encode()})
-    return words
+    replace_files({weights: blob, document_path: text.encode()})
+    return document_path
 
 
 def policy_pair(path: Path | str) -> tuple[Path, Path]:

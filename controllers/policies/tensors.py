@@ -73,8 +73,8 @@ def check_header(start: bytes, size: int) -> dict[str, Any]:
             continue
         check_shape(entry, _TENSOR, f"tensor {name[:60]}")
         (begin, end), kind, shape = entry["data_offsets"], entry["dtype"], entry["shape"]
-        wanted = BYTES.get(kind, 0) * math.prod(shape)
-        if kind not in BYTES or len(shape) > MOST_DIMENSIONS or end - begin != wanted:
+        expected = BYTES.get(kind, 0) * math.prod(shape)
+        if kind not in BYTES or len(shape) > MOST_DIMENSIONS or end - begin != expected:
             raise TensorHeaderError(
                 f"tensor {name[:60]} announces {kind[:20]!r} numbers of shape {shape[:9]} in "
                 f"{end - begin} bytes, which do not fit"

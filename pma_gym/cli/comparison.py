@@ -43,8 +43,8 @@ def compare(
     compared = load_model(model or data.model or DEFAULT_MODEL)
     states = read_states(trials) if trials else {}
     checked = check_dataset(data, compared, stop=False)
-    named, words = prepared(checked.trials, compared)
-    for line in (*(checked.checked or ()), *words):
+    named, remarks = prepared(checked.trials, compared)
+    for line in (*(checked.checked or ()), *remarks):
         say(f"warning: {line}")
     absent = [each.name for each in named if trials and each.name not in states]
     if absent:

@@ -59,8 +59,8 @@ def convert(
         seen = [_document(each) for each in columns]
         print_json({"tables": count, "columns": seen, "checks": said, "written": str(path)})
         return
-    for words in said:
-        say(f"check: {words}")
+    for message in said:
+        say(f"check: {message}")
     print(f"Written {path}: read it, correct it, then: pma-gym diagnose {folder}")
 
 

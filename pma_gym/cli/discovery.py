@@ -287,8 +287,8 @@ def _inputs(folder: Path, model: str | None, checks: bool) -> tuple[Dataset, Mod
         from pma_gym.discovery.preparation.data_checks import check_dataset
 
         trials = check_dataset(trials, initial_model, stop=checks)
-        for words in trials.checked or ():
-            say(f"warning: {words}")
+        for message in trials.checked or ():
+            say(f"warning: {message}")
     return trials, initial_model
 
 

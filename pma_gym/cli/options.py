@@ -125,8 +125,8 @@ def _make_strict(command: Any) -> None:  # noqa: ANN401 - Typer brings its own C
 
 
 def _checked(process: Callable[..., Any], param: Any, numbers: type | None) -> Callable[..., Any]:  # noqa: ANN401
-    def refuse(ctx: Any, words: str) -> NoReturn:  # noqa: ANN401
-        raise typer.BadParameter(words, ctx=ctx, param=param)
+    def refuse(ctx: Any, message: str) -> NoReturn:  # noqa: ANN401
+        raise typer.BadParameter(message, ctx=ctx, param=param)
 
     def process_value(ctx: Any, value: Any) -> Any:  # noqa: ANN401
         texts = value if isinstance(value, list | tuple) else (value,)

@@ -72,7 +72,7 @@ class TimeLeft:
         self._clock = clock
         self._took: dict[str, float] = {}
         self._step = ""
-        self._begun = 0.0
+        self._step_start = 0.0
         self._done, self._total = 0, 0
 
     def __call__(self, step: str, done: int, total: int) -> None:
@@ -80,8 +80,8 @@ class TimeLeft:
         now = self._clock()
         if step != self._step:
             if self._step:
-                self._took[_kind(self._step)] = now - self._begun
-            self._step, self._begun = step, now
+                self._took[_kind(self._step)] = now - self._step_start
+            self._step, self._step_start = step, now
         self._done, self._total = done, total
 
     def seconds(self) -> tuple[float, float] | None:
@@ -97,7 +97,7 @@ class TimeLeft:
             return least, least
         return least, least + self._expected(FITS) + self._expected(LOOK)
 
-    def words(self) -> str:
+    def text(self) -> str:
         """The remaining time as text; "" if it is unknown."""
         left = self.seconds()
         if left is None:
@@ -108,7 +108,7 @@ class TimeLeft:
 
     def _rest(self, kind: str) -> float:
         """Seconds that are left of the step that runs: by its pace, once it has one."""
-        so_far = self._clock() - self._begun
+        so_far = self._clock() - self._step_start
         if 0 < self._done < self._total:
             return so_far / self._done * (self._total - self._done)
         return max(self._expected(kind) - so_far, 0.0)
@@ -195,14 +195,14 @@ class StepProgress:
         now = time.monotonic()
         if not begins and now - self._said < PAUSE_S:
             return
-        left = self._left.words() if self._left else ""
+        left = self._left.text() if self._left else ""
         so_far = "" if begins else f" {done} of {total}"
         print(f"{step}{so_far} ...{left and f' {left}'}", file=sys.stderr, flush=True)
         self._said = now
 
     def overall(self, step: str) -> str:
         """Text with the remaining time of all steps, for the running step; "" for the others."""
-        return self._left.words() if self._left and step == self._step else ""
+        return self._left.text() if self._left and step == self._step else ""
 
 
 class _OverallColumn(ProgressColumn):
@@ -215,5 +215,5 @@ class _OverallColumn(ProgressColumn):
         self._progress = progress
 
     def render(self, task: Task) -> Text:
-        words = self._progress.overall(task.description)
-        return Text(f"in all: {words}" if words else "")
+        rest = self._progress.overall(task.description)
+        return Text(f"in all: {rest}" if rest else "")

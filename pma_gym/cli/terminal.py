@@ -121,9 +121,9 @@ NamedModel = Annotated[
 _PACKAGES = ("pma-gym", "gymnasium", "numpy", "scipy", "llvmlite", "control")
 
 
-def print_version(wanted: bool) -> None:
+def print_version(requested: bool) -> None:
     """Print the version and exit, for `--version`."""
-    if wanted:
+    if requested:
         print(f"pma-gym {__version__}")
         raise typer.Exit
 

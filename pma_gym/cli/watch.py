@@ -152,16 +152,16 @@ def _run(env: PMAEnv, volts: Voltage, filmed: bool) -> list[np.ndarray]:
 def _voltages(source: str | None, env: PMAEnv) -> Callable[[PMAEnv], Voltage]:
     """What makes the voltages, given the environment once it has begun."""
     if source is None:
-        return lambda begun: _swing(begun.regulator_voltage)
+        return lambda environment: _swing(environment.regulator_voltage)
     if ":" in source.replace(":\\", ""):
         controller = controller_of(source)
 
-        def prepared(begun: PMAEnv) -> Voltage:
-            controller.reset(begun.reference, begun.station)
+        def prepared(environment: PMAEnv) -> Voltage:
+            controller.reset(environment.reference, environment.station)
             return lambda now: float(controller.act(now.measurement, now.time))
 
         return prepared
-    return lambda begun: _commands(Path(source), begun)
+    return lambda environment: _commands(Path(source), environment)
 
 
 def _swing(rest_voltage: float) -> Voltage:

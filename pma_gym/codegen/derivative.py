@@ -40,11 +40,11 @@ def _depends_on(value: Value) -> Sequence[Value]:
     return known[:1] if known else value.operands
 
 
-def _along(nodes: list[Value], seed: Value, held: set[int]) -> dict[int, Slope]:
+def _along(nodes: list[Value], seed: Value, constants: set[int]) -> dict[int, Slope]:
     """The derivative of every node with respect to one of them."""
     slopes: dict[int, Slope] = {seed.id: seed.graph.constant(1.0)}
     for node in nodes:
-        if node.id in held:
+        if node.id in constants:
             slopes.setdefault(node.id, None)
             continue
         if known := node.graph.slopes.get(node.id):

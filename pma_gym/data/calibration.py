@@ -93,5 +93,5 @@ def quantise(volts: Any) -> Any:  # noqa: ANN401
         The nearest of its 4096 levels, -10 to 9.995 V; NaN stays NaN.
     """
     highest = DAQ_LIMIT - DAQ_STEP
-    held = where(volts < -DAQ_LIMIT, -DAQ_LIMIT, where(volts > highest, highest, volts))
-    return floor(held * (1.0 / DAQ_STEP) + 0.5) * DAQ_STEP
+    clipped = where(volts < -DAQ_LIMIT, -DAQ_LIMIT, where(volts > highest, highest, volts))
+    return floor(clipped * (1.0 / DAQ_STEP) + 0.5) * DAQ_STEP

@@ -164,8 +164,8 @@ class Trial:
         from pma_gym.pages.figures import notebook_html, png
 
         notes = "; ".join(f"{name}: {text}" for name, text in self.provenance.items())
-        words = f"Trial: {len(self)} samples, {self.duration:.6g} s. {notes}"
-        blocks = [Paragraph(words.strip()), Picture("trial", "")]
+        summary = f"Trial: {len(self)} samples, {self.duration:.6g} s. {notes}"
+        blocks = [Paragraph(summary.strip()), Picture("trial", "")]
         return notebook_html(blocks, {"trial": png(self.plot())})
 
     def _check(self) -> None:

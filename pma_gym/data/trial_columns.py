@@ -33,19 +33,19 @@ class SampleError(TrialError):
         sample: its index.
     """
 
-    def __init__(self, words: str, sample: int) -> None:
+    def __init__(self, template: str, sample: int) -> None:
         """Take the message, in which `{place}` stands for where the sample is."""
-        self._words = words
+        self._template = template
         self.sample = sample
         super().__init__(self.at(f"sample {sample}"))
 
     def at(self, place: str) -> str:
         """The message, with another name of the place: `row 3 of ramp.csv`."""
-        return self._words.replace("{place}", place)
+        return self._template.replace("{place}", place)
 
     def __reduce__(self) -> tuple[type["SampleError"], tuple[object, ...]]:
         """Send to other processes by construction."""
-        return SampleError, (self._words, self.sample)
+        return SampleError, (self._template, self.sample)
 
 
 @dataclass(frozen=True)

@@ -102,12 +102,12 @@ def compare(
     return TrialComparison(dict(zip(names, (first, second), strict=True)), sizes, samples)
 
 
-def _interpolated(wanted: Array, time: Array, values: Array) -> Array:
+def _interpolated(instants: Array, time: Array, values: Array) -> Array:
     """Values at wanted times, from those that are measured; NaN beyond them."""
     known = ~np.isnan(values)
     if not known.any():
-        return np.full(wanted.shape, np.nan)
-    return np.interp(wanted, time[known], values[known], left=np.nan, right=np.nan)
+        return np.full(instants.shape, np.nan)
+    return np.interp(instants, time[known], values[known], left=np.nan, right=np.nan)
 
 
 def _value(name: str, size: float) -> str:

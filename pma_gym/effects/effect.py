@@ -215,8 +215,8 @@ class Effect:
         quantity, many = self.quantities[stem], isinstance(value, list | tuple)
         unit = "without a unit" if quantity.unit == "1" else f"in {quantity.unit}"
         if many != (stem in self.rows):
-            wanted = "a list of numbers" if stem in self.rows else "one number"
-            raise ValueError(f"{self.name}.{file_key} must be {wanted} {unit}, got {value!r}")
+            expected = "a list of numbers" if stem in self.rows else "one number"
+            raise ValueError(f"{self.name}.{file_key} must be {expected} {unit}, got {value!r}")
         numbers = value if isinstance(value, list | tuple) else (value,)
         for number in numbers:
             if isinstance(number, bool) or not isinstance(number, int | float):

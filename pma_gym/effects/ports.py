@@ -145,5 +145,5 @@ def measured_output(port: str) -> str:
     >>> measured_output("sensor_delay:angle"), measured_output("drive_delay")
     ('angle', '')
     """
-    begun = (each for each in (SENSOR, SENSOR_DELAY) if port.startswith(each))
-    return port.removeprefix(next(begun, port))
+    prefixes = (each for each in (SENSOR, SENSOR_DELAY) if port.startswith(each))
+    return port.removeprefix(next(prefixes, port))

@@ -76,7 +76,7 @@ def masked(mask: object, count: int) -> NDArray[np.int64]:
     return np.flatnonzero(array)
 
 
-def wanted_pressures(
+def requested_pressures(
     options: Mapping[str, Any], indices: NDArray[np.int64], count: int, model: Model
 ) -> list[Pressure] | None:
     """Return the pressures that a reset's options set, or None.

@@ -38,7 +38,7 @@ class Batch(Protocol):
     # In quotes: Gymnasium 1.1's Box takes no type.
     single_observation_space: "spaces.Box[Any]"
     single_action_space: "spaces.Box[Any]"
-    _begun: NDArray[np.bool_]
+    _started: NDArray[np.bool_]
     _ended: NDArray[np.bool_]
 
     @property
@@ -118,7 +118,7 @@ class BatchMember(PMAEnv):
     @property
     def _idle(self) -> str | None:  # type: ignore[override]
         """Why there is no episode to go on with; None if there is one."""
-        if not self._batch._begun[self._index]:
+        if not self._batch._started[self._index]:
             return NOT_BEGUN
         return "the episode ended" if self._batch._ended[self._index] else None
 

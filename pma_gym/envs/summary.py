@@ -112,10 +112,10 @@ def summaries(
     total, number, by_phase = np.zeros(len(samples)), np.zeros(len(samples)), {}
     for phase in schedule.phases:
         count = np.clip(samples - phase.first, 0.0, phase.samples)
-        begun = count > 0.0
+        started = count > 0.0
         # A phase that has not begun adds nothing: its sum is 0.
         total, number = total + sums[phase.name], number + count
-        mean = np.divide(sums[phase.name], count, out=np.full(len(count), np.nan), where=begun)
+        mean = np.divide(sums[phase.name], count, out=np.full(len(count), np.nan), where=started)
         by_phase[_phase_key(phase.name, unit)] = np.sqrt(mean) / factor
     whole = np.sqrt(total / number)
     return {

@@ -26,7 +26,7 @@ from pma_gym.engine.option_checks import (
 from pma_gym.engine.options import EnvironmentOptions, parse_options, parse_task
 from pma_gym.engine.snapshot import put, take
 from pma_gym.engine.state_layout import PARTS
-from pma_gym.envs.batch import BatchActions, FunctionRewards, all_seeds, masked, wanted_pressures
+from pma_gym.envs.batch import BatchActions, FunctionRewards, all_seeds, masked, requested_pressures
 from pma_gym.envs.copies import Copies
 from pma_gym.envs.member import BatchMember
 from pma_gym.envs.rendering.display import Display
@@ -137,7 +137,7 @@ class PMAVectorEnv(
         self.action_space = batch_space(self.single_action_space, num_envs)
         self._all = np.arange(num_envs)
         self._seeds: tuple[int | None, ...] = (None,) * num_envs
-        self._begun = np.zeros(num_envs, np.bool_)
+        self._started = np.zeros(num_envs, np.bool_)
         self._ended = np.zeros(num_envs, np.bool_)
         # Which of them have ended, None if none has: looking through them takes a microsecond.
         self._waiting: NDArray[np.int64] | None = None
@@ -179,14 +179,16 @@ class PMAVectorEnv(
             if "reset_mask" in requested
             else self._all
         )
-        wanted = wanted_pressures(requested, indices, self.num_envs, self.engine.nominal_model)
+        pressures = requested_pressures(
+            requested, indices, self.num_envs, self.engine.nominal_model
+        )
         seeds = self._own_seeds(all_seeds(self._or_drawn(seed), self.num_envs), indices)
         # Should it fail on the way, these have no episode.
-        self._begun[indices], self._idle = False, True
+        self._started[indices], self._idle = False, True
         self.engine.seed(indices, seeds)
-        self.engine.reset(indices, wanted)
-        self._begun[indices], self._ended[indices] = True, False
-        self._idle = not self._begun.all()
+        self.engine.reset(indices, pressures)
+        self._started[indices], self._ended[indices] = True, False
+        self._idle = not self._started.all()
         self._waiting = np.flatnonzero(self._ended) if self._ended.any() else None
         return self.engine.observations.copy(), {}
 
@@ -225,7 +227,7 @@ class PMAVectorEnv(
         return EnvState(
             self._setup,
             take(self.engine),
-            self._begun.tobytes(),
+            self._started.tobytes(),
             self._ended.tobytes(),
             None,
             self._seeds,
@@ -245,9 +247,9 @@ class PMAVectorEnv(
         """
         state = check_state(self._spread(state), self._setup, self.num_envs)
         put(self.engine, state.simulation)
-        self._begun = np.frombuffer(state.begun, np.bool_).copy()
+        self._started = np.frombuffer(state.begun, np.bool_).copy()
         self._ended = np.frombuffer(state.ended, np.bool_).copy()
-        self._idle = not self._begun.all()
+        self._idle = not self._started.all()
         self._waiting = np.flatnonzero(self._ended) if self._ended.any() else None
         self._seeds = state.seeds
         self._np_random = generator_at(state.generator, self._np_random)
@@ -330,7 +332,7 @@ class PMAVectorEnv(
 
     def _require_episodes(self) -> None:
         if self._idle:
-            late = np.flatnonzero(~self._begun)
+            late = np.flatnonzero(~self._started)
             which = "" if len(late) == self.num_envs else f" in environments {_few(late)}"
             raise gym.error.ResetNeeded(f"no episode has begun{which}: call reset() before step()")
         if self.autoreset_mode == AutoresetMode.DISABLED:
@@ -399,9 +401,9 @@ class PMAVectorEnv(
         """Gauge pressure at the start of every episode (Pa), shape (num_envs,)."""
         return self.engine.pressures.copy()
 
-    def set_pressures(self, wanted: Mapping[int, Pressure]) -> None:
+    def set_pressures(self, pressures: Mapping[int, Pressure]) -> None:
         """Begin later episodes at other pressures (kPa), by the index of the environment."""
-        self.engine.set_pressures(wanted)
+        self.engine.set_pressures(pressures)
         # States are of environments with the same pressures.
         self._setup_of = None, ()
 

@@ -271,7 +271,7 @@ class LevenbergMarquardt:
         width = np.where(far, np.maximum(np.abs(values) * np.sqrt(TINY), width / TINY**2), width)
         return np.where(boundless, np.abs(values), np.maximum(np.abs(values), width))
 
-    def _held(self) -> NDArray[np.bool_]:
+    def _at_bound(self) -> NDArray[np.bool_]:
         """Parameters at a bound that blocks a further descent."""
         downhill = -self.best.gradient
         low = (self.values <= self.lower) & (downhill < 0.0)
@@ -286,10 +286,10 @@ class LevenbergMarquardt:
 
     def result(self, converged: bool) -> Fit:
         """Return the fit at the best parameters."""
-        residuals, held = self.residuals, self._held()
+        residuals, at_bound = self.residuals, self._at_bound()
         values, size = self.named(self.values), len(self.values)
         covariance = np.full((size, size), np.nan)
-        loose = np.flatnonzero(~held)
+        loose = np.flatnonzero(~at_bound)
         surplus = max(1.0, self.best.chi_square / max(residuals.count - size, 1))
         part = np.ix_(loose, loose)
         covariance[part] = surplus * inverse(self.best.curvature[part])
@@ -305,5 +305,5 @@ class LevenbergMarquardt:
             rounds=self.rounds,
             simulated=self.simulated,
             converged=converged,
-            at_bounds=tuple(path for path, at in zip(values, held, strict=True) if at),
+            at_bounds=tuple(path for path, at in zip(values, at_bound, strict=True) if at),
         )

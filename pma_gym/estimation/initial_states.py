@@ -73,7 +73,7 @@ class Correction(NamedTuple):
 
 def meet(
     states: Sequence[Array],
-    held: Sequence[Sequence[Array]],
+    readings: Sequence[Sequence[Array]],
     trials: Sequence[Logged],
     levels: Array,
     further: int,
@@ -83,15 +83,15 @@ def meet(
     Args:
         states: of all simulations of each trial, the last of which are the first with another start
             each, shape (tried + further, rows, states); the others are changed in place.
-        held: what the sensors hold in them (SI), shape (tried + further, rows) each, by trial and
-            signal.
+        readings: what the sensors hold in them (SI), shape (tried + further, rows) each, by
+            trial and signal.
         trials: what was measured.
         levels: standard deviations of the signals (SI), shape (signals,).
         further: how many other starts there are.
     """
     sought = [
         _Sought.of(signals, logged, levels, further)
-        for signals, logged in zip(held, trials, strict=True)
+        for signals, logged in zip(readings, trials, strict=True)
     ]
     known = [each for each in sought if np.isfinite(each.sizes).all() and each.sizes.any()]
     # What one start does as well as the other is shared between them.
@@ -110,23 +110,25 @@ class _Sought(NamedTuple):
     Attributes:
         moves: what each other start does to the readings, shape (further, readings).
         first: the same for the first signal alone.
-        wanted: measured less simulated, shape (tried, readings).
+        deviations: measured less simulated, shape (tried, readings).
         sizes: products of the moves, shape (further, further).
     """
 
     moves: Array
     first: Array
-    wanted: Array
+    deviations: Array
     sizes: Array
 
     @classmethod
-    def of(cls, held: Sequence[Array], logged: Logged, levels: Array, further: int) -> "_Sought":
+    def of(
+        cls, readings: Sequence[Array], logged: Logged, levels: Array, further: int
+    ) -> "_Sought":
         along, off = [], []
         for channel in logged.channels:
             there = logged.there[channel]
             # One signal has no weight beside another.
             weight = levels[logged.channels[0]] / levels[channel]
-            read = held[channel][:, there]
+            read = readings[channel][:, there]
             change = weight * (read[-further:] - read[0])
             if logged.signals[channel].has_free_zero:
                 change = change - change.mean(axis=1, keepdims=True)
@@ -134,30 +136,30 @@ class _Sought(NamedTuple):
             off.append(weight * (logged.measured[channel, there] - read[:-further]))
         one = len(along) == 1
         moves = along[0] if one else np.concatenate(along, axis=1)
-        wanted = off[0] if one else np.concatenate(off, axis=1)
+        deviations = off[0] if one else np.concatenate(off, axis=1)
         # A simulation that runs away has no finite sizes; it stays as it is.
         with np.errstate(over="ignore", invalid="ignore"):
-            return cls(moves, along[0], wanted, moves @ moves.T)
+            return cls(moves, along[0], deviations, moves @ moves.T)
 
 
 def _corrected(
     states: Array, logged: Logged, sought: _Sought, level: float, inverse: Array | None
 ) -> Correction:
     """The correction of one trial, made in its states; none where `inverse` is None."""
-    moves, first, wanted, _ = sought
+    moves, first, deviations, _ = sought
     further = len(moves)
     if inverse is None:
         return Correction(np.zeros(further), np.inf, False)
-    shares = wanted @ moves.T @ inverse
+    shares = deviations @ moves.T @ inverse
     for share, moved in zip(shares.T, states[-further:] - states[0], strict=True):
         states[:-further] += share[:, None, None] * moved
-    misfit = float(wanted[0] @ wanted[0])
+    misfit = float(deviations[0] @ deviations[0])
     rough = False
     if logged.time[-1] - logged.time[0] > BENDING_S:
         at = logged.channels[0]
         span = float(np.ptp(logged.measured[at, logged.there[at]]))
         most = float(np.abs(shares[0] @ first).max())
-        rest = wanted[0] - shares[0] @ moves
+        rest = deviations[0] - shares[0] @ moves
         bends = math.isfinite(most) and most**2 > BENDS * level * span
         rough = bends and float(rest @ rest) < LEAVES * misfit
     return Correction(shares[0], misfit, rough)

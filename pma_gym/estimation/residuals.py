@@ -123,11 +123,11 @@ class Residuals(SimulatedTrials):
 
         Shape (1 + p, signals, rows).
         """
-        held = self._held(states, zeros, vectors, logged.channels)
+        readings = self._held(states, zeros, vectors, logged.channels)
         count, rows = len(states), len(logged.time)
         moved = (count - 1) // 2 if central else count - 1
         differences = np.zeros((1 + moved, len(self.plant.outputs), rows))
-        for channel, signal in enumerate(held):
+        for channel, signal in enumerate(readings):
             if not logged.measures[channel]:
                 continue
             there = differences[:, channel]
@@ -154,10 +154,10 @@ class Residuals(SimulatedTrials):
         for number, states, zero in zip(block, spaces, zeros, strict=True):
             logged, weights = self._trials[number], self._weights[number]
             channels = logged.channels
-            held = self._held(states, zero, vectors, logged.channels)
+            readings = self._held(states, zero, vectors, logged.channels)
             trials.append(
                 Signals(
-                    [held[i] for i in channels],
+                    [readings[i] for i in channels],
                     [logged.measured[i] for i in channels],
                     [weights[i] for i in channels],
                     central,

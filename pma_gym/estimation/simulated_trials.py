@@ -187,8 +187,8 @@ class SimulatedTrials:
     def _start_shares(self, number: int, space: Array, zeros: Array, vectors: Array) -> Array:
         """Multiple of the move that brings each simulation nearest to the readings, (tried,)."""
         logged = self._trials[number]
-        held = self._held(space, zeros, np.concatenate([vectors, vectors[:1]]), logged.channels)
-        left = np.stack(held, axis=1) - logged.measured
+        readings = self._held(space, zeros, np.concatenate([vectors, vectors[:1]]), logged.channels)
+        left = np.stack(readings, axis=1) - logged.measured
         changes = self._in_noise(logged, left * logged.counts)
         along = changes[-1] - changes[0]
         return memory_start.best_shares(changes[:-1], along, self._reaches[number])
@@ -220,11 +220,11 @@ class SimulatedTrials:
         further = count - tried
         last = np.concatenate([vectors, *([vectors[:1]] * further)])
         logs = [self._trials[i] for i in block]
-        held = [
+        readings = [
             self._held(space, zeros[i], last, logged.channels)
             for i, logged, space in zip(block, logs, spaces, strict=True)
         ]
-        corrections = initial_states.meet(spaces, held, logs, levels, further)
+        corrections = initial_states.meet(spaces, readings, logs, levels, further)
         for i, space, correction in zip(block, spaces, corrections, strict=True):
             if correction.rough:
                 of = slice(i * count, (i + 1) * count)
@@ -267,8 +267,8 @@ class SimulatedTrials:
             states, zeros[:] = solver.equilibria_at(self.plant, first[0], first[1], every)
             batch = self._batch(number, tables, states, zeros, space)
             self.attempts += simulate_batches(self.plant.program, [batch], self.threads)
-            held, least = self._held(space, zeros, last, logged.channels), met.misfit
-            (met,) = initial_states.meet([space], [held], [logged], self._levels, further)
+            readings, least = self._held(space, zeros, last, logged.channels), met.misfit
+            (met,) = initial_states.meet([space], [readings], [logged], self._levels, further)
             if not met.misfit < least:
                 # Where dry friction sticks, no move of the start tells what the next one does.
                 space[:tried] = before
@@ -360,8 +360,8 @@ class SimulatedTrials:
                     there + i * truth.strides[0],
                 )
         unread = truth if len(asked) == len(columns) else np.zeros((count, rows))
-        held = [unread] * len(columns)
+        readings = [unread] * len(columns)
         for signal in asked:
             at = columns[signal]
-            held[signal] = states[:, :, at] if at >= 0 else truth[:, :, signal]
-        return held
+            readings[signal] = states[:, :, at] if at >= 0 else truth[:, :, signal]
+        return readings

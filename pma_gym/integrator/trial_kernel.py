@@ -60,7 +60,7 @@ def write_simulate(module: ir.Module, system: System, width: int) -> None:
         return b.load(offset(b, address(job, name), row), typ=DOUBLE)
 
     jump = eq.graph.input("jump", CHANGING)
-    begun = first_size(made.size, jump)
+    first_step = first_size(made.size, jump)
 
     def begin_row(k: Operand, job: Operand, row: Operand) -> None:
         next_row = b.add(row, integer(1))
@@ -83,8 +83,8 @@ def write_simulate(module: ir.Module, system: System, width: int) -> None:
             larger = b.fcmp_ordered(">", moves, moved)
             moved = b.select(larger, moves, moved)
         size = lane.get(made.size, k)
-        emitted = lane.one.emit(b, [begun], {made.size.id: size, jump.id: moved})
-        lane.put(made.size, k, b.select(linear, size, emitted[begun.id]))
+        emitted = lane.one.emit(b, [first_step], {made.size.id: size, jump.id: moved})
+        lane.put(made.size, k, b.select(linear, size, emitted[first_step.id]))
         lane.hold(k, known)
         b.store(row, offset(b, rows, k, INTEGER))
 

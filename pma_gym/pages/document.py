@@ -118,14 +118,14 @@ def to_markdown(blocks: Sequence[Block], pictures: Mapping[str, bytes], folder: 
             case Paragraph(text):
                 parts.append(_without_tags(text))
             case Callout(text, note):
-                words = (f"**{_without_tags(text)}**", _without_tags(note))
-                parts.append("\n>\n".join(f"> {each}" for each in words if each))
+                texts = (f"**{_without_tags(text)}**", _without_tags(note))
+                parts.append("\n>\n".join(f"> {each}" for each in texts if each))
             case Formula(text):
                 fence = "`" * (1 + max((len(run) for run in re.findall("`{2,}", text)), default=2))
                 parts.append(f"{fence}text\n{text}\n{fence}")
             case Steps(items):
-                words = map(_without_tags, items)
-                parts.append("\n".join(f"{i}. {item}" for i, item in enumerate(words, start=1)))
+                texts = map(_without_tags, items)
+                parts.append("\n".join(f"{i}. {item}" for i, item in enumerate(texts, start=1)))
             case TextTable():
                 parts.append(_markdown_table(block))
             case Picture(name, caption) if name in pictures:
@@ -203,12 +203,12 @@ def html_block(block: Block, pictures: Mapping[str, bytes]) -> str:
             width = _shown_width(pictures[name])
             image = f'<img alt="{alt}" width="{width}" src="data:image/png;base64,{data}">'
             shown = ' class="printed"' if printed else ""
-            words = f"<figcaption>{_inline(caption)}</figcaption>"
-            return f"<figure{shown}>{image}{words}</figure>"
+            figcaption = f"<figcaption>{_inline(caption)}</figcaption>"
+            return f"<figure{shown}>{image}{figcaption}</figure>"
         case InteractiveFigure(name, caption):
             plot = f'<div class="plot" id="figure-{html.escape(name)}"></div>'
-            words = f"<figcaption>{_inline(caption)}</figcaption>"
-            return f'<figure class="interactive">{plot}{words}</figure>'
+            figcaption = f"<figcaption>{_inline(caption)}</figcaption>"
+            return f'<figure class="interactive">{plot}{figcaption}</figure>'
         case _:
             return ""
 

@@ -157,9 +157,9 @@ class Plant(CompiledModel):
             ValueError: a command is missing, or has no value in the first row; a later empty cell
                 keeps the value before it.
         """
-        begun = begun_at(self.model, trial.memory_at_start)
-        if begun != self.model:
-            return Plant(begun, self.tolerance).simulate(trial, noise, seed, interpolation)
+        start_model = begun_at(self.model, trial.memory_at_start)
+        if start_model != self.model:
+            return Plant(start_model, self.tolerance).simulate(trial, noise, seed, interpolation)
         motor, regulator = sensors.voltages(self.model, trial)
         states, zero = self.run(trial.time, motor, regulator, interpolation)
         truth = self.observe(states, zero)

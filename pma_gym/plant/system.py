@@ -33,9 +33,9 @@ def static_force(eq: PlantEquations) -> Value:
     """Force of the muscle on the slide at rest, without the cable, at the initial effect states."""
     force = eq["muscle_force"] + eq["slide_force"]
     nothing = eq.graph.constant(0.0)
-    begun = memories_at_start(eq)
+    start_values = memories_at_start(eq)
     memories = {
-        entry.value.id: begun.get(entry.name, nothing)
+        entry.value.id: start_values.get(entry.name, nothing)
         for entry in eq.remembered
         if "memory_" in entry.name
     }

@@ -187,11 +187,11 @@ def _grid(schedule: TrialSchedule, phase: Phase, time: NDArray[np.float64]) -> N
 
 
 def _check_gaps(
-    schedule: TrialSchedule, wanted: NDArray[np.float64], time: NDArray[np.float64]
+    schedule: TrialSchedule, instants: NDArray[np.float64], time: NDArray[np.float64]
 ) -> None:
     """Refuse a phase that the log does not cover closely enough."""
-    first = np.searchsorted(time, wanted[0], side="right")
-    last = np.searchsorted(time, wanted[-1], side="left")
+    first = np.searchsorted(time, instants[0], side="right")
+    last = np.searchsorted(time, instants[-1], side="left")
     # 0 stands for the trial's start, where an empty cell would be bridged too.
     known = np.concatenate(([0.0], time))[first : last + 2]
     gaps = np.diff(known)

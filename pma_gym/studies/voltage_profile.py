@@ -88,18 +88,18 @@ def voltage_from_input(x_input: ArrayLike, quadratic: Quadratic) -> NDArray[np.f
     Source:
         Serres 2008, section 5.2.1 and tables I4-I20.
     """
-    wanted = np.asarray(x_input, dtype=float)
-    if not np.all(wanted <= quadratic.reach):
+    inputs = np.asarray(x_input, dtype=float)
+    if not np.all(inputs <= quadratic.reach):
         raise ValueError(
             f"displacement must lie in 0-{1e3 * quadratic.reach:.4g} mm, which 0-10 V reach; "
-            f"the input needs {1e3 * np.max(wanted):.4g} mm. Ask for a smaller or smoother "
+            f"the input needs {1e3 * np.max(inputs):.4g} mm. Ask for a smaller or smoother "
             "reference, or another pressure"
         )
     square, linear, constant = quadratic
     # At the peak itself rounding can leave the discriminant a hair below zero.
-    root = np.sqrt(np.maximum(linear**2 - 4.0 * square * (constant - wanted), 0.0))
+    root = np.sqrt(np.maximum(linear**2 - 4.0 * square * (constant - inputs), 0.0))
     voltage = (root - linear) / (2.0 * square)
-    return np.where(wanted == 0.0, 0.0, np.clip(voltage, 0.0, VOLTAGE_LIMIT))
+    return np.where(inputs == 0.0, 0.0, np.clip(voltage, 0.0, VOLTAGE_LIMIT))
 
 
 SAMPLE_TIME = 0.2
@@ -218,24 +218,24 @@ def feedforward(
     Source:
         Serres 2008, sections 4.2 and 5.2.1.
     """
-    wanted = np.asarray(reference, dtype=np.float64)
+    target = np.asarray(reference, dtype=np.float64)
     model = profile_model(pressure_kpa)
     transfer = cascade_transfer(model.muscle_rate, MOTOR_RATE)
-    x_input = inverse_recursion(wanted, tustin_recursion(transfer, sample_time))
+    x_input = inverse_recursion(target, tustin_recursion(transfer, sample_time))
     try:
         voltage = voltage_from_input(x_input, model.quadratic)
     except ValueError as error:
-        raise ValueError(f"at {pressure_kpa:g} kPa: {error}{_cause(wanted, model)}") from error
-    time = sample_time * np.arange(wanted.size, dtype=np.float64)
-    return VoltageProfile(time, wanted, x_input, voltage)
+        raise ValueError(f"at {pressure_kpa:g} kPa: {error}{_cause(target, model)}") from error
+    time = sample_time * np.arange(target.size, dtype=np.float64)
+    return VoltageProfile(time, target, x_input, voltage)
 
 
-def _cause(wanted: NDArray[np.float64], model: ProfileModel) -> str:
+def _cause(target: NDArray[np.float64], model: ProfileModel) -> str:
     """What to add to the error where the reference itself is within reach."""
-    if not np.all(wanted <= model.quadratic.reach):
+    if not np.all(target <= model.quadratic.reach):
         return ""
     return (
-        f". The reference itself needs only {1e3 * np.max(wanted):.4g} mm: the rest is the "
+        f". The reference itself needs only {1e3 * np.max(target):.4g} mm: the rest is the "
         "oscillation of the inverse, which grows with 1/T^2; use a longer sample_time"
     )
 

@@ -171,18 +171,18 @@ class _Balance:
         self.plant, self.pressure, self.load = plant, pressure, task.load
         self.rotates = task.schedule.followed.is_angle
         self.parameters = plant.model.parameters
-        self.wanted = task.schedule.reference(_times(task))
+        self.target = task.schedule.reference(_times(task))
 
     def of_motor(self) -> str | None:
         """What the motor lacks."""
         rotor, cable, drive = (self.parameters[n] for n in ("rotor", "cable", "drive"))
         rest = self.plant.settle(0.0, pressure=self.pressure).zero_contraction
-        wound = rotor.radius * self.wanted if self.rotates else self.wanted
-        pull = self._force(rest - wound, self._held)
+        wound = rotor.radius * self.target if self.rotates else self.target
+        pull = self._force(rest - wound, self._pressures)
         # The cable gives way by a few hundredths of the extension: four rounds are plenty.
         for _ in range(4 if self.rotates else 0):
             stretch = cable.slack + np.maximum(pull, 0.0) / cable.stiffness
-            pull = self._force(rest - np.maximum(wound - stretch, 0.0), self._held)
+            pull = self._force(rest - np.maximum(wound - stretch, 0.0), self._pressures)
         if np.any(pull < -ROUNDING_N):
             return f"the cable would have to push {_when(pull < -ROUNDING_N)}"
         return _beyond("motor", (pull - drive.offset) / drive.gain)
@@ -192,7 +192,7 @@ class _Balance:
         drive, line = self.parameters["drive"], self.parameters["regulator_line"]
         motor = (self.load - drive.offset) / drive.gain
         rest = self.plant.settle(motor, pressure=self.pressure)
-        x = rest.state[self.plant.states.index("contraction")] + self.wanted
+        x = rest.state[self.plant.states.index("contraction")] + self.target
         low = np.zeros(len(x))
         high = np.full(len(x), 2.0 * (10.0 * line.gain + line.offset))
         for _ in range(_HALVINGS):
@@ -202,8 +202,8 @@ class _Balance:
         return _beyond("regulator", (0.5 * (low + high) - line.offset) / line.gain)
 
     @property
-    def _held(self) -> NDArray[np.float64]:
-        return np.full(len(self.wanted), self.pressure)
+    def _pressures(self) -> NDArray[np.float64]:
+        return np.full(len(self.target), self.pressure)
 
     def _force(self, x: NDArray[np.float64], pressure: NDArray[np.float64]) -> NDArray[np.float64]:
         """Force of the muscle as it moves along contractions (N), without memories."""

@@ -193,7 +193,7 @@ class MomentProfile(NamedTuple):
         """Moment (N m) at an angle (rad)."""
         moment = self.first
         for i, slope in enumerate(self.slopes):
-            moment = moment + slope * _held(angle - self.angles[i], self._width(i))
+            moment = moment + slope * _clipped_to(angle - self.angles[i], self._width(i))
         return moment
 
     def _width(self, i: int) -> Any:  # noqa: ANN401
@@ -278,5 +278,5 @@ def unsteady(count: Any, stream: Any, key: tuple[Any, Any], zero: Any) -> Any:  
     return normals(philox((count, stream, zero + OWN_STREAM, zero), key))[0]
 
 
-def _held(value: Any, width: Any) -> Any:  # noqa: ANN401
+def _clipped_to(value: Any, width: Any) -> Any:  # noqa: ANN401
     return where(value < 0.0, 0.0, where(value > width, width, value))

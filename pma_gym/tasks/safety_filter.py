@@ -120,7 +120,7 @@ def _reserve(left: Any, safety_filter: SafetyFilter) -> Any:  # noqa: ANN401
 def _influence(angle: Any, safety_filter: SafetyFilter) -> Any:  # noqa: ANN401
     """Change of the moment by the pressure at an angle (N m/Pa)."""
     way = angle * (1.0 / FULL_ANGLE)
-    held = where(way < 0.0, 0.0, where(way > 1.0, 1.0, way))
-    return safety_filter.start_influence + held * (
+    clipped = where(way < 0.0, 0.0, where(way > 1.0, 1.0, way))
+    return safety_filter.start_influence + clipped * (
         safety_filter.end_influence - safety_filter.start_influence
     )

@@ -114,11 +114,11 @@ class Task:
         >>> TASKS["rotation"].title
         'Isokinetic rotation'
         """
-        words = self.name.replace("_", " ")
+        name = self.name.replace("_", " ")
         if self.name in TASKS:
-            return f"Isokinetic {words}"
+            return f"Isokinetic {name}"
         contracts = self.schedule.followed.shortens
-        return words.capitalize() + (" contraction" if contracts else "")
+        return name.capitalize() + (" contraction" if contracts else "")
 
     @property
     def structure(self) -> tuple[str, ...]:
@@ -197,9 +197,9 @@ def phase_rmse(schedule: TrialSchedule, position: NDArray[np.float64]) -> dict[s
     Returns:
         RMSE (m or rad) by phase name, and `all`: over the samples of all phases.
     """
-    begun = {name: e for name, e in phase_errors(schedule, position).items() if len(e)}
-    known = {name: rmse(error) for name, error in begun.items()}
-    return known | {"all": rmse(np.concatenate(list(begun.values())))}
+    started = {name: e for name, e in phase_errors(schedule, position).items() if len(e)}
+    known = {name: rmse(error) for name, error in started.items()}
+    return known | {"all": rmse(np.concatenate(list(started.values())))}
 
 
 LIMITS: tuple[tuple[str, str, float], ...] = (
@@ -254,7 +254,7 @@ def limit_in_words(model: Model, code: float, exercise: Exercise | None = None) 
     if not code:
         return ""
     limits = model.parameters["limits"]
-    words = (
+    texts = (
         f"contraction above {limits.contraction * 1e3:g} mm",
         f"muscle stretched over {limits.stretch * 1e3:g} mm beyond its resting length",
         f"cable tension above {limits.tension:g} N",
@@ -262,11 +262,11 @@ def limit_in_words(model: Model, code: float, exercise: Exercise | None = None) 
     )
     if exercise:
         speed = exercise.safe_speed / SI_FACTORS["deg"]
-        words += (
+        texts += (
             f"moment at the joint above the safe {exercise.safe_moment:g} N m",
             f"joint faster than the safe {speed:g} deg/s",
         )
-    return words[int(code) - 1]
+    return texts[int(code) - 1]
 
 
 def absolute_reward(error_percent: Any, change: Any) -> Any:  # noqa: ANN401

@@ -145,8 +145,8 @@ def speeds(quantity: str, seed: int = 0, name: str = "") -> Task:
     The first leads up from 0; the others stay in 25 to 95 % of the range.
     """
     span, _ = _span(quantity)
-    held = (LOW * span, HIGH * span, SLOWEST * span, FASTEST * span)
-    return _drawn("speeds", quantity, seed, name, motions.ways(seed, *held, DURATION_S))
+    ranges = (LOW * span, HIGH * span, SLOWEST * span, FASTEST * span)
+    return _drawn("speeds", quantity, seed, name, motions.ways(seed, *ranges, DURATION_S))
 
 
 def _drawn(kind: str, quantity: str, seed: int, name: str, motion: Motion) -> Task:

@@ -129,15 +129,15 @@ def _chosen(chooser: str, case: Case, answer: Answer, rounds: int, judge: Judge)
             break
         seed = [case.truth["seed"], case.truth["number"], 1 + k, CHOOSERS.index(chooser)]
         g = np.random.default_rng(seed)
-        words, volts = "", answer.following
+        excitation, volts = "", answer.following
         if chooser == "random":
-            words, volts = random_experiment(g, rows)
+            excitation, volts = random_experiment(g, rows)
         elif answer.document is not None:
-            words = answer.document["next_experiment"]["excitation"]
+            excitation = answer.document["next_experiment"]["excitation"]
         case = with_trial(case, volts, g)
-        begun = time.perf_counter()
+        start = time.perf_counter()
         answer = asked(case, case.truth["number"], judge)
-        done.append(_round(case, answer, words) | {"seconds": time.perf_counter() - begun})
+        done.append(_round(case, answer, excitation) | {"seconds": time.perf_counter() - start})
     return done
 
 
@@ -155,12 +155,12 @@ def with_trial(case: Case, volts: Volts, g: np.random.Generator) -> Case:
     )
 
 
-def _round(case: Case, answer: Answer, words: str) -> Round:
+def _round(case: Case, answer: Answer, excitation: str) -> Round:
     said = "no answer"
     if answer.document is not None:
         said = compare(case.truth, answer.document).said
     hidden = [effect["name"] for effect in case.truth["effects"]]
-    return {"excitation": words, "said": said, **judged(said, hidden)}
+    return {"excitation": excitation, "said": said, **judged(said, hidden)}
 
 
 @dataclass(frozen=True)
@@ -187,7 +187,7 @@ class Work:
 
     def __call__(self) -> records.CaseRecord:
         """Do it."""
-        begun = time.perf_counter()
+        start = time.perf_counter()
         case = self.block.draw(self.seed, self.number)
         drawn = time.perf_counter()
         kept = self.folder / "data" if self.keep else None
@@ -200,7 +200,7 @@ class Work:
             # Here, for it compiles the package's library of experiments.
 
             rounds = follow(case, answer, self.block.rounds, self.judge)
-        ends = {"draw": drawn - begun, "diagnose": answered - drawn}
+        ends = {"draw": drawn - start, "diagnose": answered - drawn}
         ends["rounds"] = time.perf_counter() - answered
         return records.CaseRecord(
             self.number,

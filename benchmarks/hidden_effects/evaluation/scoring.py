@@ -135,7 +135,7 @@ def _beside(value: float | None, target: Target | None) -> dict[str, Any]:
     """A target and whether it is met; nothing where there is none."""
     if target is None:
         return {}
-    return {"target": target.words(), "met": None if value is None else target.met(value)}
+    return {"target": target.text(), "met": None if value is None else target.met(value)}
 
 
 def _amount(value: float | None, target: Target | None) -> dict[str, Any]:
@@ -184,12 +184,12 @@ def _by_effect(some: Sequence[Outcome]) -> dict[str, Any]:
 
 def _gap_closed(name: str, some: Sequence[Outcome]) -> dict[str, Any]:
     closed = [share for outcome in some for share in outcome.closed]
-    wanted = name in GAP_BLOCKS
+    has_limit = name in GAP_BLOCKS
     middle = float(np.median(closed)) if closed else None
     tenth = float(np.percentile(closed, 10)) if closed else None
     return {
-        "median": _amount(middle, GAP_MEDIAN if wanted else None),
-        "tenth_percentile": _amount(tenth, GAP_TENTH if wanted else None),
+        "median": _amount(middle, GAP_MEDIAN if has_limit else None),
+        "tenth_percentile": _amount(tenth, GAP_TENTH if has_limit else None),
         "n": len(closed),
     }
 
@@ -212,7 +212,7 @@ def _sizes(some: Sequence[Outcome]) -> dict[str, Any]:
             errors.setdefault(path, []).append(error)
             covered.setdefault(path, []).append(outcome.covered[path])
     every = [error for each in errors.values() for error in each]
-    inside = [held for each in covered.values() for held in each]
+    inside = [covers for each in covered.values() for covers in each]
     return {
         "median_error": _amount(float(np.median(every)) if every else None, SIZE_ERROR),
         "covered": rate(inside, COVERAGE),

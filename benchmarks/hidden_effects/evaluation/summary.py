@@ -28,9 +28,9 @@ def diagnosis(kept: Path = KEPT) -> str:
     """The rates that a newcomer asks for, with 95 % interval and count, as Markdown."""
     blocks = read_json(kept, "journal_mib", own=True, finite=False)["blocks"]
     lines = ["| | Share (95 %) | Cases |", "| :-- | --: | --: |"]
-    for words, block, name in ROWS:
+    for label, block, name in ROWS:
         rate = blocks[block]["rates"][name]
-        lines.append(f"| {words} | {_rate(rate)} | {rate['n']} |")
+        lines.append(f"| {label} | {_rate(rate)} | {rate['n']} |")
     measured = [
         one for block in dict.fromkeys(row[1] for row in ROWS) for one in blocks[block]["measured"]
     ]
@@ -119,15 +119,15 @@ def measured_in(blocks: Mapping[str, Any]) -> list[Measured]:
 
 def _rates(name: str, figures: dict[str, Any]) -> list[list[str]]:
     rows = [
-        [name, words, percent(figure), *_verdict(figure)]
-        for words, figure in figures["rates"].items()
+        [name, label, percent(figure), *_verdict(figure)]
+        for label, figure in figures["rates"].items()
     ]
     gap, sizes = figures["gap_closed"], figures["sizes"]
-    for key, words in (("median", "median"), ("tenth_percentile", "tenth percentile")):
+    for key, label in (("median", "median"), ("tenth_percentile", "tenth percentile")):
         if gap[key]["value"] is not None:
             value = f"{gap[key]['value']:.3f}, n {gap['n']}"
             rows.append(
-                [name, f"gap closed on held-out trials, {words}", value, *_verdict(gap[key])]
+                [name, f"gap closed on held-out trials, {label}", value, *_verdict(gap[key])]
             )
     error = sizes["median_error"]
     if error["value"] is not None:
@@ -146,11 +146,11 @@ def _verdict(figure: dict[str, Any]) -> list[str]:
 
 def _own(figures: dict[str, Any]) -> list[Block]:
     seconds = figures["seconds"]
-    words = f"{figures['n']} cases; verdicts: {listed(figures['verdicts'])}."
+    text = f"{figures['n']} cases; verdicts: {listed(figures['verdicts'])}."
     if seconds["median"] is not None:
-        words += f" A diagnosis took {seconds['median']:.1f} s (median), {seconds['most']:.1f} s"
-        words += " at most."
-    blocks: list[Block] = [Paragraph(words), _confusion(figures["confusion"])]
+        text += f" A diagnosis took {seconds['median']:.1f} s (median), {seconds['most']:.1f} s"
+        text += " at most."
+    blocks: list[Block] = [Paragraph(text), _confusion(figures["confusion"])]
     if figures["by_effect"]:
         blocks.append(_by_effect(figures["by_effect"]))
     if len(figures["by_size"]) > 1:

@@ -25,7 +25,7 @@ class Target:
         above = self.least is None or value >= self.least
         return above and (self.most is None or value <= self.most)
 
-    def words(self) -> str:
+    def text(self) -> str:
         """The bounds as a reader has them: `>= 0.92`."""
         if self.least is not None and self.most is not None:
             return f"{self.least:g}-{self.most:g}"

@@ -147,7 +147,7 @@ class Outcome:
     @property
     def missing(self) -> tuple[str, ...]:
         """Base parameters that were off and are not named."""
-        return tuple(name for name in self.off if not _begun(self.moved, PATHS[name]))
+        return tuple(name for name in self.off if not _all_start_with(self.moved, PATHS[name]))
 
     def settled_by(self, chooser: str, most: int) -> bool:
         """Whether the truth or its group was named within so many rounds of a way, or at once."""
@@ -257,7 +257,7 @@ def _off(truth: Mapping[str, Any]) -> list[str]:
     return [name for name in off if name in PATHS]
 
 
-def _begun(paths: Sequence[str], starts: tuple[str, ...]) -> bool:
+def _all_start_with(paths: Sequence[str], starts: tuple[str, ...]) -> bool:
     """Whether one of some paths begins in one of some ways."""
     return any(path.startswith(starts) for path in paths)
 
@@ -271,7 +271,7 @@ def _parameters(outcome: Outcome, truth: Mapping[str, Any], answer: Mapping[str,
     named = [*moved, *answer.get("not_identifiable", {})]
     outcome.moved = tuple(moved)
     outcome.parameters = not outcome.missing
-    outcome.parameters_reported = all(_begun(named, PATHS[name]) for name in off)
+    outcome.parameters_reported = all(_all_start_with(named, PATHS[name]) for name in off)
     outcome.parameters_spurious = bool(outcome.beyond)
 
 

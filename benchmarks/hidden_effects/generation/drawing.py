@@ -90,10 +90,10 @@ def _write(work: Mapping[int, Callable[[], str]], folder: Path, jobs: int) -> No
         # A process a core; numpy's own threads would only get in each other's way.
         os.environ["OMP_NUM_THREADS"] = "1"
 
-    def tell(_: int, words: str) -> None:
+    def tell(_: int, message: str) -> None:
         nonlocal done
         done += 1
-        _tell(done, count, words, began)
+        _tell(done, count, message, began)
 
     run_or_raise(missing, local(jobs), tell)
 
@@ -118,6 +118,6 @@ def _kept(case: Case, folder: Path, place: int) -> str:
     return f"{case_name(place)} {case.truth['block']} {sizes}"
 
 
-def _tell(done: int, count: int, words: str, began: float) -> None:
+def _tell(done: int, count: int, message: str, began: float) -> None:
     took = time.monotonic() - began
-    print(f"{done}/{count}  {words}  ({took:.0f} s)", file=sys.stderr, flush=True)
+    print(f"{done}/{count}  {message}  ({took:.0f} s)", file=sys.stderr, flush=True)

@@ -46,8 +46,8 @@ def draw_trial(
     if loose:
         # Only a pressure at which the muscle fits the rig with no load at all.
         pressure = np.minimum(pressure, 470e3)
-        begun = np.clip((time - START_S) / g.uniform(0.3, 1.5), 0.0, 1.0)
-        load = np.minimum(load, loads_at(float(pressure.min()))[1]) * begun
+        ramp = np.clip((time - START_S) / g.uniform(0.3, 1.5), 0.0, 1.0)
+        load = np.minimum(load, loads_at(float(pressure.min()))[1]) * ramp
     motor, regulator = volts(pressure, load)
     if loose:
         motor[time <= START_S] = 0.0
@@ -193,7 +193,7 @@ def _ramp(time: Array) -> Array:
     return np.clip((time - LOW_START_S) / (SECONDS - 2.0 * LOW_START_S), 0.0, 1.0)
 
 
-def _held(g: Generator, time: Array) -> Asked:
+def _steps_held(g: Generator, time: Array) -> Asked:
     pressure, low, high = _range(g)
     return [(time * 0.0 + pressure, time * 0.0 + load) for load in g.uniform(low, high, 2)]
 
@@ -230,7 +230,7 @@ def _one_pressure(g: Generator, time: Array) -> Asked:
 
 
 LOW_EXCITATION: dict[str, Callable[[Generator, Array], Asked]] = {
-    "held commands": _held,
+    "held commands": _steps_held,
     "one slow ramp": _slow_ramp,
     "small moves": _small_moves,
     "one load": _one_load,

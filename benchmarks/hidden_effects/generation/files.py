@@ -102,15 +102,15 @@ def safe_experiments() -> tuple[Excitation, ...]:
     return tuple(library([parse_model(tomllib.loads(lab_model()))]))
 
 
-def named(words: str, g: np.random.Generator) -> tuple[str, Volts]:
+def named(prefix: str, g: np.random.Generator) -> tuple[str, Volts]:
     """Name and volts of an excitation whose name begins with words, at one of its settings.
 
     Raises:
         ValueError: there is none.
     """
-    experiments = [each for each in safe_experiments() if each.name.startswith(words)]
+    experiments = [each for each in safe_experiments() if each.name.startswith(prefix)]
     if not experiments:
-        raise ValueError(f"the library has no excitation that begins with {words!r}")
+        raise ValueError(f"the library has no excitation that begins with {prefix!r}")
     chosen = experiments[int(g.integers(len(experiments)))]
     return chosen.name, volts(chosen)
 

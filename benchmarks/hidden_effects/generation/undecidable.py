@@ -170,7 +170,7 @@ def shown_by_library(g: np.random.Generator, rig: Rig, effect: str) -> dict[str,
 
     None where no size that was tried has a ratio from `SHOWN` to four times that.
     """
-    words, (motor, regulator) = named(WITNESS[effect], g)
+    excitation, (motor, regulator) = named(WITNESS[effect], g)
     experiment = rig.experiment(motor[None], regulator[None])
     typical, kind = ALL[effect].draw(g, 900.0), ALL[effect]
     sizes = [float(size) for size in SIZES if size <= kind.most]
@@ -188,7 +188,7 @@ def shown_by_library(g: np.random.Generator, rig: Rig, effect: str) -> dict[str,
         "name": effect,
         "parameters": kind.at(typical, sizes[k]),
         "size": sizes[k],
-        "witness": {"protocol": words, "r": round(ratios[k], 4)},
+        "witness": {"protocol": excitation, "r": round(ratios[k], 4)},
     }
 
 

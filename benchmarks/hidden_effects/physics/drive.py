@@ -134,12 +134,12 @@ class CurrentLag(Hidden):
 
     def __init__(self, time: Array) -> None:
         """Take time constants of all lanes."""
-        self.time, self.held, self.before = time, np.zeros(0), np.zeros(0)
+        self.time, self.last_output, self.last_input = time, np.zeros(0), np.zeros(0)
 
     def loads(self, loads: Array, step: float) -> Array:
         """A first-order filter of the loads, at rest under the first ones."""
         if step == 0.0:
-            self.held, self.before = loads[0].copy(), loads[0].copy()
+            self.last_output, self.last_input = loads[0].copy(), loads[0].copy()
             return loads
         # Exact for a load that is linear between two times, whatever the lag.
         out = loads.copy()
@@ -147,9 +147,9 @@ class CurrentLag(Hidden):
             keep = float(np.exp(-step / self.time[i]))
             share = (1.0 - keep) * self.time[i] / step
             now, past = 1.0 - share, share - keep
-            memory = [keep * self.held[i] + past * self.before[i]]
+            memory = [keep * self.last_output[i] + past * self.last_input[i]]
             out[:, i], _ = lfilter([now, past], [1.0, -keep], loads[:, i], zi=memory)
-        self.held, self.before = out[-1].copy(), loads[-1].copy()
+        self.last_output, self.last_input = out[-1].copy(), loads[-1].copy()
         return out
 
 

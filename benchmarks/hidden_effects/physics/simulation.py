@@ -62,7 +62,7 @@ def simulate(commands: Commands, rig: Numbers, hidden: Sequence[Hidden] = ()) ->
     moment = equilibrium(commands, rig, hidden, step)
     sensors = _Sensors(moment, hidden, lanes)
     readings = np.empty((lanes, rows, 4))
-    readings[:, 0] = sensors.held
+    readings[:, 0] = sensors.filtered
     for first in range(0, rows - 1, BLOCK):
         count = min(BLOCK, rows - 1 - first) * SUBSTEPS
         middles = (np.arange(count, dtype=np.float64) + first * SUBSTEPS + 0.5) * step
@@ -156,7 +156,7 @@ class _Sensors:
         rest = [signal[None, :] for signal in signals]
         for effect in hidden:
             rest = effect.sensed(rest, moment.step)
-        self.held = np.stack([signal[0] for signal in rest], axis=1)
+        self.filtered = np.stack([signal[0] for signal in rest], axis=1)
 
     def follow(self, signals: list[Array], step: float) -> list[Array]:
         """Lagged signals at the ends of the steps, for signals at their middles."""
@@ -167,9 +167,9 @@ class _Sensors:
             lagged = np.empty_like(signal)
             for keep in np.unique(self.keep[i]):
                 own = self.keep[i] == keep
-                memory = (keep * self.held[own, i])[None, :]
+                memory = (keep * self.filtered[own, i])[None, :]
                 lagged[:, own], _ = lfilter([1.0 - keep], [1.0, -keep], signal[:, own], 0, memory)
-            self.held[:, i] = lagged[-1]
+            self.filtered[:, i] = lagged[-1]
             out.append(lagged)
         return out
 

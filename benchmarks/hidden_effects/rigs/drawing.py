@@ -280,23 +280,23 @@ def _hidden(rng: np.random.Generator, kind: str, campaign: Campaign) -> list[Hid
             names = [name for name in KNOWN[campaign.rig.kind] if name not in taken]
             offer = OFFERS[str(rng.choice(names))]
         low, high = FAINT if rng.random() < 0.5 else STRONG
-        wanted = log_uniform(rng, low, high)
+        target = log_uniform(rng, low, high)
         if offer.fits(campaign.rig):
-            effect = _sized(campaign, offer.draw(rng, campaign.rig), wanted)
+            effect = _sized(campaign, offer.draw(rng, campaign.rig), target)
             chosen += [effect] if effect is not None else []
     return chosen
 
 
-def _sized(campaign: Campaign, most: HiddenEffect, wanted: float) -> HiddenEffect | None:
+def _sized(campaign: Campaign, most: HiddenEffect, target: float) -> HiddenEffect | None:
     """An effect at some r, or as large as it may be; None where that is not visible."""
     share, ratio, scaled = 0.2, 0.0, most
     for _ in range(STEPS):
         scaled = most.scaled(share)
         ratio = campaign.ratio(scaled)
-        if abs(ratio / wanted - 1.0) < NEAR or (share == 1.0 and ratio < wanted):
+        if abs(ratio / target - 1.0) < NEAR or (share == 1.0 and ratio < target):
             break
-        share = min(1.0, share * min(max(wanted / max(ratio, 1e-9), 0.02), 20.0))
-    return scaled if FAINT[0] * (1.0 - NEAR) <= ratio <= FAR * wanted else None
+        share = min(1.0, share * min(max(target / max(ratio, 1e-9), 0.02), 20.0))
+    return scaled if FAINT[0] * (1.0 - NEAR) <= ratio <= FAR * target else None
 
 
 def _described(campaign: Campaign, effect: HiddenEffect) -> dict[str, Any]:

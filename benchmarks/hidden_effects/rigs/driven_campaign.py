@@ -246,11 +246,11 @@ def draw_driven(
         stiffness=rig.stiffness * rng.uniform(0.93, 1.07),
         gravity=rig.gravity * rng.uniform(0.93, 1.07),
     )
-    held = bool(rig.stiffness or rig.gravity)
-    opened = rng.random() < (0.5 if held else 0.15)
+    has_support = bool(rig.stiffness or rig.gravity)
+    opened = rng.random() < (0.5 if has_support else 0.15)
     bandwidth = 0.0 if opened else min(rig.frequency * rng.uniform(1.5, 4.0), rig.rate / 25.0)
     lengths = draw_lengths(rng, rig.rate, rig.frequency)
-    if opened and not held:
+    if opened and not has_support:
         lengths = [max(5.0, min(8.0, each)) for each in lengths]
     references = [
         draw_reference(rng, rig.travel, rig.frequency, rig.rate, round(each * rig.rate))

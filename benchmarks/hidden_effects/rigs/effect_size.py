@@ -100,14 +100,14 @@ def change(rig: Rig, motions: Sequence[Motion], exact: Sequence[Array]) -> Array
     parts = [_windows(rig, m, e, rows) for m, e in zip(motions, exact, strict=True)]
     columns = np.concatenate([part for part in parts if part is not None], axis=1)
     # (regressors, windows, rows): each window gives up its own starts first.
-    wanted, known, starts = columns[0], columns[1:-2], columns[-2:]
+    effect, known, starts = columns[0], columns[1:-2], columns[-2:]
     basis = np.linalg.qr(starts.transpose(1, 2, 0))[0]
-    wanted, known = _without(basis, wanted), _without(basis, known)
+    effect, known = _without(basis, effect), _without(basis, known)
     table = known.reshape(len(known), -1).T
     scales = np.linalg.norm(table, axis=0)
     table = table[:, scales > 1e-9 * scales.max()]
     table = table / np.linalg.norm(table, axis=0)
-    values = wanted.ravel()
+    values = effect.ravel()
     return values - table @ np.linalg.lstsq(table, values, rcond=1e-10)[0]
 
 

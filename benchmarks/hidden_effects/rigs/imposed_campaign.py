@@ -65,9 +65,9 @@ class ImposedCampaign:
             pressure = np.full(len(without), self.rig.pressures[i])
             known = [motion.a, motion.v, motion.q, pressure, np.ones(len(without))]
             changed.append(np.array([self.force((effect,), i) - without, *known]))
-        wanted, *known = np.concatenate(changed, axis=1)
+        change, *known = np.concatenate(changed, axis=1)
         table = np.array([each / (np.linalg.norm(each) or 1.0) for each in known]).T
-        left = wanted - table @ np.linalg.lstsq(table, wanted, rcond=1e-10)[0]
+        left = change - table @ np.linalg.lstsq(table, change, rcond=1e-10)[0]
         return float(np.sqrt(np.mean(left**2)) / self.cell.rms)
 
     def held(self, effects: Sequence[HiddenEffect]) -> "ImposedCampaign":

@@ -60,25 +60,25 @@ def _store() -> _Store | None:
 
 
 @cache
-def _opened(wanted: Path | None) -> _Store | None:
-    if wanted is None:
+def _opened(folder: Path | None) -> _Store | None:
+    if folder is None:
         fault = "this user has no home folder to keep compiled plants in"
     else:
         try:
-            return _open(wanted)
+            return _open(folder)
         except UntrustedError as error:
-            fault = f"compiled plants are not kept in {wanted}: {error}"
+            fault = f"compiled plants are not kept in {folder}: {error}"
         except OSError as error:
-            fault = f"cannot write compiled plants to {wanted} ({error})"
+            fault = f"cannot write compiled plants to {folder} ({error})"
     store = _temporary()
     place = "in memory only" if store is None else "into a temporary folder for this process"
     warnings.warn(f"{fault}; compiling {place}; {_FIX}", stacklevel=2)
     return store
 
 
-def _open(wanted: Path) -> _Store:
-    private_folder(wanted, link=True)
-    kernels = wanted / "kernels"
+def _open(folder: Path) -> _Store:
+    private_folder(folder, link=True)
+    kernels = folder / "kernels"
     private_folder(kernels, link=False)
     # Only trying tells: a disk may be full or read-only.
     with tempfile.TemporaryFile(dir=kernels):

@@ -99,7 +99,7 @@ class _Board:
 
     Attributes:
         threads: how many there are.
-        wanted: number of works that there are to do, also those that begin at once.
+        announced: number of works that there are to do, also those that begin at once.
         ready: the work that they would do.
         call: the first arguments of `lead` and `serve`.
     """
@@ -117,7 +117,7 @@ class _Board:
         self.threads = len(self._tables[0])
         self._works = np.zeros(SHARE, np.int64)
         self._numbers = np.zeros((self.threads, SHARE), np.int64)
-        self.wanted = 0
+        self.announced = 0
         self.call = self._works.ctypes.data, self._numbers.ctypes.data, self.threads
         self.prepare(0)
 
@@ -128,7 +128,7 @@ class _Board:
 
     def announce(self) -> None:
         """There is one more work to do than were begun; again, should Ctrl-C come before that."""
-        self.wanted = int(self._works[0]) + 1
+        self.announced = int(self._works[0]) + 1
 
 
 class _Worker:
@@ -156,7 +156,7 @@ class _Worker:
             self.wake.clear()
             self.asleep = True
             # Work may have been announced between the last look and the line above.
-            if self._board.wanted == seen and not self.dismissed:
+            if self._board.announced == seen and not self.dismissed:
                 self.wake.wait()
             self.asleep = False
 

@@ -130,9 +130,9 @@ def _named(
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", TrialWarning)
         trial = trial_of(table, description.columns, description.form)
-    words = [str(warning.message).removeprefix(path.name).lstrip(": ") for warning in caught]
+    messages = [str(warning.message).removeprefix(path.name).lstrip(": ") for warning in caught]
     strange = ""
-    if any(each.startswith(_UNKNOWN) for each in words):
+    if any(each.startswith(_UNKNOWN) for each in messages):
         strange = strange_columns(table.header, description.columns, trial)
     if not trial.measurements:
         hint = f"; {strange}" if strange else ""
@@ -141,22 +141,22 @@ def _named(
             f"rotation_deg, load_n or pressure_kpa, or map it in [columns] of {DESCRIPTION}{hint}"
         )
     check_signals(table, trial, description.columns)
-    words = [strange if each.startswith(_UNKNOWN) else each for each in words]
+    messages = [strange if each.startswith(_UNKNOWN) else each for each in messages]
     doubts += [
         (path.name, each)
         for each in (
-            *words,
+            *messages,
             *held_commands(trial, description.form.interpolation == "zoh"),
             *empty_runs(trial, table),
             *_outliers(trial, table),
         )
     ]
     trial = without_ends(
-        trial, description.sensors, lambda words: doubts.append((path.name, words))
+        trial, description.sensors, lambda messages: doubts.append((path.name, messages))
     )
     about = {**description.trials.get(path.name, {})}
-    begun = about.pop("memory_at_start", None)
-    return NamedTrial(path.name, replace(trial, memory_at_start=begun), **about)
+    memory_at_start = about.pop("memory_at_start", None)
+    return NamedTrial(path.name, replace(trial, memory_at_start=memory_at_start), **about)
 
 
 def _outliers(trial: Trial, table: Table) -> Iterator[str]:
@@ -171,10 +171,10 @@ def _outliers(trial: Trial, table: Table) -> Iterator[str]:
 def _gathered(doubts: list[tuple[str, str]], count: int) -> Iterator[str]:
     """One warning for each thing said, however many files it holds for."""
     files: dict[str, list[str]] = {}
-    for file, words in doubts:
-        files.setdefault(words, []).append(file)
-    for words, names in files.items():
+    for file, message in doubts:
+        files.setdefault(message, []).append(file)
+    for message, names in files.items():
         shown = ", ".join(names[:_SHOWN])
         more = f" and {len(names) - _SHOWN} more" if len(names) > _SHOWN else ""
         every = "all files" if len(names) == count > 1 else f"{shown}{more}"
-        yield f"{every}: {words}"
+        yield f"{every}: {message}"

@@ -172,9 +172,9 @@ def _pressure(file_key: dict[str, Array]) -> _Slip | None:
 def _load(file_key: dict[str, Array]) -> _Slip | None:
     measured = _largest(file_key.get("load"))
     wished = _largest(file_key.get("load_command"))
-    asked, words = wished, "load_command_n asks for"
+    asked, asks = wished, "load_command_n asks for"
     if not wished:
-        asked, words = (
+        asked, asks = (
             _USUAL_N_PER_V * _largest(file_key.get("motor_voltage")),
             "the motor pulls with",
         )
@@ -182,7 +182,7 @@ def _load(file_key: dict[str, Array]) -> _Slip | None:
         return None
     for unit, factor in (("kilonewtons", 1e3), ("millinewtons", 1e-3)):
         if 1 / _FACTOR < measured * factor / asked < _FACTOR:
-            seen = f"reaches {measured:.3g} N where {words} about {asked:.3g} N"
+            seen = f"reaches {measured:.3g} N where {asks} about {asked:.3g} N"
             return _Slip("load", seen, unit, factor)
     return None
 

@@ -132,9 +132,9 @@ def _check_parts(description: Description, names: Sequence[str]) -> None:
         for name, table in description.trials.items()
         if table.get("repeat_of")
     }
-    held = {name.partition(PART)[0] for name in names}
+    whole_files = {name.partition(PART)[0] for name in names}
     for name in said:
-        if name not in names and name.partition(PART)[0] in held:
+        if name not in names and name.partition(PART)[0] in whole_files:
             raise TrialError(
                 f"dataset.toml names the trial {name!r}{suggestion(name, names)}, but the data set "
                 f"has {', '.join(map(repr, list(names)[:_SHOWN]))}; write one of these"

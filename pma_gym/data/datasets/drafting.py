@@ -110,7 +110,7 @@ def draft(title: str, model: str, columns: Sequence[SeenColumn], proposals: Sequ
         lines.append(f"{quoted(each.name)} = {entry}  # {seen}; {one_line(each.guess.why)}")
     if proposals:
         lines += ["", "# What the checks say of this draft:"]
-        lines += [f"# - {one_line(words)}" for words in proposals]
+        lines += [f"# - {one_line(proposal)}" for proposal in proposals]
     return "\n".join(lines) + "\n"
 
 

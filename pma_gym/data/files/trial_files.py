@@ -182,11 +182,11 @@ def write_trial(trial: Trial, path: str | os.PathLike[str]) -> None:
 
 def encode_trial(trial: Trial, path: str | os.PathLike[str]) -> bytes:
     """Encode a trial as `write_trial` writes it to a file of this name."""
-    held = {"time": trial.time, **trial.commands, **trial.measurements}
+    signals = {"time": trial.time, **trial.commands, **trial.measurements}
     columns = {
-        column.name: column.from_si(held[column.quantity])
+        column.name: column.from_si(signals[column.quantity])
         for column in COLUMNS
-        if column.quantity in held
+        if column.quantity in signals
     }
     return ENCODERS[_written_suffix(Path(path))](columns, trial.provenance)
 

@@ -69,11 +69,11 @@ def strange_columns(header: Sequence[str], mapping: ColumnMap, trial: Trial) -> 
     strange = [name for name in header if name and name not in BY_NAME and name not in mapping]
     if not strange:
         return ""
-    held = {"time", *trial.commands, *trial.measurements}
+    known = {"time", *trial.commands, *trial.measurements}
     hints = []
     for name in strange:
         likely = looks_like(name)
-        if likely and likely[0].quantity not in held:
+        if likely and likely[0].quantity not in known:
             hints.append((name, *likely))
     said = f"unknown columns are ignored: {', '.join(map(repr, strange))}"
     if hints:

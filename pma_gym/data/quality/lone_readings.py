@@ -79,7 +79,7 @@ class LoneReadings:
 
 def without_lone_readings(trials: Sequence[Trial]) -> tuple[list[Trial], list[str]]:
     """Return the trials without isolated outliers, and a message for each signal with some."""
-    kept, words = list(trials), []
+    kept, messages = list(trials), []
     names = dict.fromkeys(name for trial in trials for name in trial.measurements)
     for quantity in names:
         lone = _lone(trials, quantity)
@@ -90,12 +90,12 @@ def without_lone_readings(trials: Sequence[Trial]) -> tuple[list[Trial], list[st
             for trial in trials
             if quantity in trial.measurements
         )
-        words.append(lone.words(total))
+        messages.append(lone.words(total))
         for number, at in lone.rows.items():
             measured = kept[number].measurements
             row = np.where(at, np.nan, measured[quantity])
             kept[number] = replace(kept[number], measurements={**measured, quantity: row})
-    return kept, words
+    return kept, messages
 
 
 def _lone(trials: Sequence[Trial], quantity: str) -> LoneReadings | None:

@@ -26,10 +26,10 @@ def read(content: bytes, file: str, request: Request) -> list[Table]:
     """
     if hdf5.SIGNATURE in content[:1024]:
         return hdf5.read(content, file, request)
-    held = needed("scipy.io", file).loadmat(io.BytesIO(content))
+    contents = needed("scipy.io", file).loadmat(io.BytesIO(content))
     variables = {
         _name(name, value): _variable(value, file, 0)
-        for name, value in held.items()
+        for name, value in contents.items()
         if name[:2] != "__"
     }
     check_limit(file, "cells", sum(v.size for v in variables.values() if isinstance(v, np.ndarray)))

@@ -67,10 +67,10 @@ def friction_path(memory, travel, direction, p):
     """
     start, slipping = direction * memory, 1.0 - BREAKAWAY_SHARE
     rest = positive(1.0 - start) * (1.0 / slipping)
-    begun = where(
+    from_start = where(
         start > BREAKAWAY_SHARE, BREAKAWAY_SHARE + 2.0 * slipping * (1.0 - rest**0.5), start
     )
-    reached = begun + direction * travel / p.presliding
+    reached = from_start + direction * travel / p.presliding
     slip = clip((reached - BREAKAWAY_SHARE) * (1.0 / slipping), 0.0, 2.0)
     # A step that goes on beyond where it turns is refused, but what it says of there shall be sane.
     elastic = clip(reached, -1.5, BREAKAWAY_SHARE)

@@ -71,8 +71,8 @@ class Picture:
         stride = _stride(history.time)
         self._actual.set_data(history.time[::stride], history.position[::stride] / self._factor)
         self._now.set_data([scene.time], [scene.position / self._factor])
-        held = np.append(history.voltages, history.voltages[-1:])
-        self._volts.set_data(np.arange(len(held)) * scene.options.period, held)
+        volts = np.append(history.voltages, history.voltages[-1:])
+        self._volts.set_data(np.arange(len(volts)) * scene.options.period, volts)
         self._canvas.restore_region(self._still)
         for axes, artist in self._moving:
             axes.draw_artist(artist)

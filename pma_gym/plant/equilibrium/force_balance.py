@@ -58,14 +58,14 @@ def _settle_by_angle(problem: EquilibriumProblem) -> None:
         load = _drive_load(problem)
         problem["angle"] = 0.0
         problem["contraction"] = _balance(problem, np.maximum(load, 0.0))
-        wanted = np.where(load > 0.0, _taut_angles(problem, load), 0.0)
-        near = ~(np.abs(wanted - angle) > _NEAR_RAD)
+        taut = np.where(load > 0.0, _taut_angles(problem, load), 0.0)
+        near = ~(np.abs(taut - angle) > _NEAR_RAD)
         contraction = np.where(done, contraction, problem["contraction"])
         with np.errstate(invalid="ignore", divide="ignore"):
-            share = (angle - before) / (angle - before - (wanted - asked))
+            share = (angle - before) / (angle - before - (taut - asked))
         share = np.where(np.isfinite(share), np.clip(share, 0.2, 2.0), 0.5)
-        before, asked = angle, wanted
-        angle = np.where(done, angle, np.where(near, wanted, angle + share * (wanted - angle)))
+        before, asked = angle, taut
+        angle = np.where(done, angle, np.where(near, taut, angle + share * (taut - angle)))
         done = done | near
         if np.all(done):
             break

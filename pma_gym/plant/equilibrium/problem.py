@@ -204,9 +204,9 @@ def put_memories(plant: SolvablePlant, vectors: np.ndarray | None, state: np.nda
     """
     for effect in plant.effects.values():
         if effect.memory_start:
-            begun = effect_parameters(plant, vectors, effect.name)[effect.memory_start]
+            memory = effect_parameters(plant, vectors, effect.name)[effect.memory_start]
             for name in effect.memory_names:
-                state[:, plant.states.index(name)] = begun
+                state[:, plant.states.index(name)] = memory
 
 
 def effect_parameters(

@@ -209,11 +209,11 @@ def resistive_moment(
     size = device.muscles.length / TESTED.length
     force = scaled_force(muscle_force(model), device.muscles)
     set_at = pressure if rest_pressure is None else rest_pressure
-    pressures, angles, rests, held = np.broadcast_arrays(
+    pressures, angles, rests, rest_moments = np.broadcast_arrays(
         *(np.asarray(value, dtype=np.float64) for value in (pressure, angle, set_at, rest_moment))
     )
     ends = size * _SHORTEST, size * _LONGEST
-    drawn = held / device.radius
+    drawn = rest_moments / device.radius
     start = contraction_at(force, rests, drawn, *ends)
     cable = model.parameters["cable"]
     stiffness = device.muscles.ratio * cable.stiffness
@@ -235,5 +235,5 @@ def _allowed(
 ) -> NDArray[np.bool_]:
     """No muscle beyond its resting length; tension and pressure within the model's limits."""
     limits = model.parameters["limits"]
-    held = tension <= limits.tension * device.muscles.ratio
-    return (contraction >= 0.0) & held & (pressure <= limits.pressure)
+    within_tension = tension <= limits.tension * device.muscles.ratio
+    return (contraction >= 0.0) & within_tension & (pressure <= limits.pressure)

@@ -222,15 +222,15 @@ def _scheduled(
 
 
 def _miss(
-    device: Device, angle: float, wanted: float, pressure: NDArray, moment: NDArray
+    device: Device, angle: float, target: float, pressure: NDArray, moment: NDArray
 ) -> Miss | None:
     """Nothing where the moments that the pressures give have the wanted one among them."""
     if not len(moment):
-        return Miss(device, angle, wanted, np.nan, np.nan, np.nan, np.nan)
+        return Miss(device, angle, target, np.nan, np.nan, np.nan, np.nan)
     low, high = float(moment.min()), float(moment.max())
-    if low - _ROUNDING <= wanted <= high + _ROUNDING:
+    if low - _ROUNDING <= target <= high + _ROUNDING:
         return None
-    return Miss(device, angle, wanted, low, high, float(pressure[0]), float(pressure[-1]))
+    return Miss(device, angle, target, low, high, float(pressure[0]), float(pressure[-1]))
 
 
 Answer = TypeVar("Answer")

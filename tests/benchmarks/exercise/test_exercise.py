@@ -76,7 +76,7 @@ def test_the_smallest_configuration_for_a_moment(tmp_path, moment, device):
     given = resistive_moment(model, answer.device, answer.setting.pressure, FULL_ANGLE).moment
     assert given == pytest.approx(moment, rel=1e-3)
     assert ("extrapolation" in answer.how) == (device != (1, 20, 250))
-    assert answer.words in (tmp_path / "report.md").read_text()
+    assert answer.text in (tmp_path / "report.md").read_text()
 
 
 def test_the_smallest_configuration_for_a_profile(tmp_path, profile):
@@ -95,9 +95,9 @@ def test_a_short_muscle_serves_a_profile_that_ends_early(tmp_path):
     )
     assert answer.device.muscles == muscles(1, 20, 150)
     device, given = answer.device, answer.setting
-    angle, model = answer.wanted.angle, load_model("station")
+    angle, model = answer.prescription.angle, load_model("station")
     held_there = resistive_moment(model, device, given.pressure, angle, given.rest_pressure)
-    assert held_there.moment == pytest.approx(answer.wanted.moment, rel=0.01)
+    assert held_there.moment == pytest.approx(answer.prescription.moment, rel=0.01)
 
 
 def test_a_given_size_narrows_the_choice(tmp_path):

@@ -87,7 +87,7 @@ def simulate(
                 world.step(drive.at(i * h))
                 if i == 0:
                     # Only the step from a row on knows what accelerates there.
-                    table[row - 1, 1:3] = world.begun()
+                    table[row - 1, 1:3] = world.start()
         table[row] = *world.state(), command
     return Motion(np.arange(rows) * interval, *table.T)
 
@@ -152,7 +152,7 @@ class World:
         data = self.data
         return data.qpos[0], data.qvel[0] + 0.5 * self.h * data.qacc[0], data.qacc[0]
 
-    def begun(self) -> tuple[float, float]:
+    def start(self) -> tuple[float, float]:
         """Speed and acceleration where the last step began."""
         data = self.data
         return data.qvel[0] - 0.5 * self.h * data.qacc[0], data.qacc[0]

@@ -137,16 +137,16 @@ class _Contact:
         for _ in range(EVENTS):
             if left <= 1e-12 * step:
                 return q, v
-            begun = time + step - left
-            sign = _sign(v) or self.axis.direction(q, self.drive.at(begun))
-            if not sign and self.axis.static(q, self.drive.at(begun)) > 0.0:
-                wait = self._until_it_breaks(q, begun, left)
+            start = time + step - left
+            sign = _sign(v) or self.axis.direction(q, self.drive.at(start))
+            if not sign and self.axis.static(q, self.drive.at(start)) > 0.0:
+                wait = self._until_it_breaks(q, start, left)
                 left -= wait
                 if wait < 1e-12 * step:
                     # Numbers so near the level that rounding decides: stay for this step.
                     return q, 0.0
                 continue
-            q, v, took = self._slip(q, v, sign, begun, left)
+            q, v, took = self._slip(q, v, sign, start, left)
             left -= took
         return q, 0.0
 
@@ -190,12 +190,12 @@ class _Contact:
         The slope of what goes with the amount of that force jumps there.
         """
         low, high = 0.0, step
-        begun = self.drive.at(time)
-        if begun * self.drive.at(time + step) >= 0.0:
+        first = self.drive.at(time)
+        if first * self.drive.at(time + step) >= 0.0:
             return step
         for _ in range(HALVINGS):
             middle = 0.5 * (low + high)
-            if self.drive.at(time + middle) * begun > 0.0:
+            if self.drive.at(time + middle) * first > 0.0:
                 low = middle
             else:
                 high = middle
