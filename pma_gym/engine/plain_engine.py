@@ -28,16 +28,16 @@ class PlainEngine(Engine):
     See `Engine` for arguments and attributes.
     """
 
-    _of: Model | None = None
+    _drawn: Model | None = None
 
     @property
     def plain(self) -> PlainPlant:
         """The episode's plant in plain Python, made anew for a drawn station."""
-        if self._of is not self.models[0]:
-            self._of = self.models[0]
+        if self._drawn is not self.models[0]:
+            self._drawn = self.models[0]
             system = self.nominal.program.zero_order_hold
             watched = course(system.equations, system.attempt, self.task).values
-            self._plain = PlainPlant(Plant(self._of, self.nominal.tolerance), watched)
+            self._plain = PlainPlant(Plant(self._drawn, self.nominal.tolerance), watched)
         return self._plain
 
     def advance(

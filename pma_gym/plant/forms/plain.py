@@ -17,6 +17,7 @@ from types import ModuleType
 
 import numpy as np
 
+from pma_gym.codegen.graph import Value
 from pma_gym.codegen.text import python_text
 from pma_gym.codegen.trace import live_inputs
 from pma_gym.integrator.equations import COMMANDS, ZERO
