@@ -45,15 +45,13 @@ def run(code, cwd, **environment):
 VARIABLES = ("HOME", "XDG_CACHE_HOME", "XDG_CONFIG_HOME", "PMA_GYM_CACHE", "MPLCONFIGDIR")
 
 
-def test_without_a_home_the_named_cache_is_used_and_nothing_said(tmp_path):
-    (kept,), error = run(NO_ENTRY + CODE, tmp_path, PMA_GYM_CACHE="cache")
-    assert kept == str(tmp_path / "cache") and error == ""
+def test_without_a_home_the_named_cache_or_the_desktop_standards_is_used_and_nothing_said(tmp_path):
+    code = f"{NO_ENTRY}{CODE}del os.environ['PMA_GYM_CACHE']{CODE}"
+    caches = {"PMA_GYM_CACHE": "cache", "XDG_CACHE_HOME": str(tmp_path / "caches")}
+    (named, standard), error = run(code, tmp_path, **caches)
+    assert named == str(tmp_path / "cache") and error == ""
+    assert standard == str(tmp_path / "caches" / "pma_gym")
     assert list((tmp_path / "cache" / "kernels").glob("*.o"))
-
-
-def test_without_a_home_the_cache_of_the_desktop_standard_is_used(tmp_path):
-    (kept,), error = run(NO_ENTRY + CODE, tmp_path, XDG_CACHE_HOME=str(tmp_path / "caches"))
-    assert kept == str(tmp_path / "caches" / "pma_gym") and error == ""
 
 
 def test_without_any_home_a_temporary_folder_serves_and_pictures_too(tmp_path):

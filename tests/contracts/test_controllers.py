@@ -7,7 +7,7 @@ import pickle
 import numpy as np
 import pytest
 
-from controllers import CONTROLLERS, Controller
+from controllers import CONTROLLERS, Controller, adrc, ilc, lqg, sliding_mode
 from pma_gym.envs import PMAEnv
 
 EXERCISE = "isotonic_exercise"
@@ -74,6 +74,13 @@ def test_a_copy_in_the_middle_of_a_trial_goes_on_alike_and_alone(name):
             env.step(env.action(given[-1]))
     # The original has gone on by now; its copy stands where it was made.
     assert [float(copied.act(*reading)) for reading in readings] == given
+
+
+@pytest.mark.parametrize("module", [adrc, ilc, lqg, sliding_mode])
+def test_defaults_lie_within_the_bounds_of_a_search(module):
+    for settings in module.DEFAULTS.values():
+        for name, (low, high) in module.BOUNDS.items():
+            assert low <= getattr(settings, name) <= high
 
 
 def test_a_copy_of_a_program_that_met_its_limits_goes_on_with_the_same_bits():

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from controllers import ILC
-from controllers.ilc import BOUNDS, DEFAULTS, LearningGain, LiftedModel, Settings
+from controllers.ilc import LearningGain, LiftedModel, Settings
 from controllers.models.nominal_motion import nominal_motion
 from pma_gym.envs import PMAEnv
 
@@ -166,9 +166,3 @@ def test_a_trial_that_broke_off_is_learned_from_as_far_as_it_came(station, readi
     assert not controller.learned[100:].any()
     controller.reset(lambda time: 5e-3 * time, station())
     assert controller.learned[:100].any()
-
-
-def test_defaults_lie_within_their_bounds():
-    for settings in DEFAULTS.values():
-        for name, (low, high) in BOUNDS.items():
-            assert low <= getattr(settings, name) <= high

@@ -1,31 +1,13 @@
-"""LQG: targets on the station, what is left of disturbances, its bits."""
+"""LQG on a station that differs from its model: what is left of disturbances, its bits."""
 
 from dataclasses import replace
 
 import numpy as np
-import pytest
 
 from controllers import LQG, PID, ImprovedFeedforward
 from pma_gym.envs import PMAEnv
 from pma_gym.plant.model import load_model
 from pma_gym.tasks import varied_station
-
-
-@pytest.mark.parametrize("pressure_kpa", [150, 550])
-def test_it_tracks_displacement_within_the_target(pressure_kpa, drive):
-    by_phase, _ = drive(LQG(), "displacement", pressure_kpa)
-    assert by_phase["displacement"] < 0.05
-
-
-@pytest.mark.parametrize("pressure_kpa", [275, 575])
-def test_it_tracks_rotation_within_the_target(pressure_kpa, drive):
-    by_phase, _ = drive(LQG(), "rotation", pressure_kpa)
-    assert by_phase["I"] < 0.25 and by_phase["II"] < 0.25 and by_phase["III"] < 0.21
-
-
-def test_it_tracks_contraction_by_the_regulator(drive):
-    by_phase, _ = drive(LQG(), "isotonic", 300)
-    assert max(by_phase.values()) < 0.1
 
 
 def driven(controller, seed=3, task="displacement", **options):

@@ -138,13 +138,12 @@ def test_truth_is_judged_only_on_request():
     assert evaluate(trial, use_truth=True)[0].regression.slope == pytest.approx(0.005)
 
 
-@pytest.mark.parametrize("suffix", [".csv", ".parquet", ".xlsx"])
-def test_a_log_from_a_file_is_judged_the_same(suffix, tmp_path):
+def test_a_log_from_a_file_is_judged_the_same(tmp_path):
     trial = log(GRID, rotation=1.01 * ROTATION.reference(GRID))
-    write_trial(trial, tmp_path / f"log{suffix}")
+    write_trial(trial, tmp_path / "log.csv")
     for row, again in zip(
         evaluate(trial, "rotation"),
-        evaluate(read_trial(tmp_path / f"log{suffix}"), "rotation"),
+        evaluate(read_trial(tmp_path / "log.csv"), "rotation"),
         strict=True,
     ):
         assert again.rmse == pytest.approx(row.rmse, rel=1e-12)

@@ -12,7 +12,6 @@ from benchmarks.__main__ import app
 from benchmarks.dissertation import FEEDFORWARDS
 from benchmarks.runner.rollout import make_environment, rollout
 from controllers import CONTROLLERS
-from pma_gym.cli import app as pma_gym
 from pma_gym.data.files.trial_files import TrialWarning, read_trial
 from pma_gym.data.trial import Trial
 from pma_gym.plant.plant import Plant
@@ -45,18 +44,6 @@ def test_the_file_moves_the_station_as_the_controller_does(controller, task, qua
     # Every 0.25 s is a row of the file and a sample at 384 Hz; voltages are written to a microvolt.
     moved, position = trial.truth[quantity][1::25], driven.position[::96]
     assert moved == pytest.approx(position, abs=2e-6)
-
-
-def test_pma_gym_simulates_the_file(tmp_path):
-    path, out = tmp_path / "volts.csv", tmp_path / "log.csv"
-    assert voltages(path, "improved_feedforward", "displacement", 300).exit_code == 0
-    done = CliRunner().invoke(
-        pma_gym, ["simulate", str(path), "--out", str(out), "--interpolation", "zoh", "--no-noise"]
-    )
-    assert done.exit_code == 0, done.output
-    log = read_trial(out)
-    contraction = log.measurements["contraction"]
-    assert contraction[0] - contraction[-1] == pytest.approx(25e-3, abs=0.1e-3)
 
 
 def test_columns_rows_and_reference(tmp_path):

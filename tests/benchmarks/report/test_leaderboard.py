@@ -126,18 +126,6 @@ def test_standings_find_who_is_better_and_by_how_much():
     assert by_name["pid"].percent == pytest.approx(4.0 * by_name["pid"].mean.estimate)
 
 
-def test_improvement_of_pairs_adds_up_to_one():
-    suite = simulated_suite()
-    pairs = board(suite, simulated_rows(suite)).standings["all tasks"].pairs
-    by_names = {(pair.first, pair.second): pair for pair in pairs}
-    assert len(pairs) == 20
-    for (first, second), pair in by_names.items():
-        back = by_names[second, first]
-        assert pair.improvement.estimate + back.improvement.estimate == 1.0
-        assert pair.ratio.estimate * back.ratio.estimate == pytest.approx(1.0)
-        assert not (pair.separated and back.separated)
-
-
 def test_missing_and_incomplete_controllers_are_named_and_not_ranked():
     suite = simulated_suite()
     rows = [row for row in simulated_rows(suite) if row["controller"] != "mpc"]

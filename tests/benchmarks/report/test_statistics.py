@@ -79,9 +79,7 @@ def test_same_seed_same_bits_and_another_seed_others():
     assert not np.array_equal(first.cases, resample([strata], units, seed=1).cases)
 
 
-@pytest.mark.parametrize(
-    ("stations", "each", "strata"), [(64, 1, 1), (64, 1, 16), (30, 4, 1)], ids=str
-)
+@pytest.mark.parametrize(("stations", "each", "strata"), [(64, 1, 16), (30, 4, 1)], ids=str)
 def test_intervals_hold_the_truth_as_often_as_they_say(stations, each, strata):
     # Errors of a station go together: its cases share most of their deviation.
     generator = np.random.default_rng(stations + each)

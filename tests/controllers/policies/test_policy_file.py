@@ -106,7 +106,7 @@ def test_a_file_too_large_is_refused_unread(pair, which, most):
         load_policy_file(pair[0])
 
 
-@pytest.mark.parametrize("cut", [0, 1, 7, 100, -1])
+@pytest.mark.parametrize("cut", [0, 7, -1])
 def test_weights_that_were_cut_off_are_refused(pair, cut):
     _, weights = pair
     weights.write_bytes(weights.read_bytes()[:cut])
