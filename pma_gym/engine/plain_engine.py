@@ -28,16 +28,28 @@ class PlainEngine(Engine):
     See `Engine` for arguments and attributes.
     """
 
+<<<<<<< HEAD
     _drawn: Model | None = None
+=======
+    _station: Model | None = None
+>>>>>>> plain
 
     @property
     def plain(self) -> PlainPlant:
         """The episode's plant in plain Python, made anew for a drawn station."""
+<<<<<<< HEAD
         if self._drawn is not self.models[0]:
             self._drawn = self.models[0]
             system = self.nominal.program.zero_order_hold
             watched = course(system.equations, system.attempt, self.task).values
             self._plain = PlainPlant(Plant(self._drawn, self.nominal.tolerance), watched)
+=======
+        if self._station is not self.models[0]:
+            self._station = self.models[0]
+            system = self.nominal.program.zero_order_hold
+            watched = course(system.equations, system.attempt, self.task).values
+            self._plain = PlainPlant(Plant(self._station, self.nominal.tolerance), watched)
+>>>>>>> plain
         return self._plain
 
     def advance(
@@ -76,10 +88,8 @@ class PlainEngine(Engine):
     def _numbers(self, count: int) -> dict[str, Number]:
         """Numbers of all inputs by name: of the record, the parameters, the references."""
         numbers: dict[str, Number] = dict(self.plain.parameters)
-        for name, place in self.state_layout.offsets.items():
-            whole = self.state_layout.kind(name) == "integer"
-            row = self.integers if whole else self.records
-            numbers[name] = numbers[f"record.{name}"] = row[0, place, 0].item()
+        for name in self.state_layout.offsets:
+            numbers[name] = numbers[f"record.{name}"] = self._stored(name).item()
         for i, action in enumerate(self.actions[0].tolist()):
             numbers[f"action.{i}"] = action
         for k in range(self.options.preview + 1):
@@ -87,7 +97,7 @@ class PlainEngine(Engine):
         # No way has been travelled since; at rest the next one may go either way.
         numbers["origin"] = numbers["contraction"]
         numbers["direction"] = -1.0 if numbers["velocity"] < 0.0 else 1.0
-        return numbers | {"horizon": self.horizon}
+        return numbers | {"horizon": float(self.horizon)}
 
     def _at(self, count: int) -> ControlStepGraph:
         """The parts of the step for the present numbers; calls the laws of the plant's effects."""
@@ -98,12 +108,15 @@ class PlainEngine(Engine):
         return ControlStepGraph(self.state_layout, eq)
 
     def _keep(self, values: Mapping[str, Value]) -> None:
-        """Write values to the record, by name."""
+        """Write what the record has a place for, by name."""
         for name, value in values.items():
             if name in self.state_layout.offsets:
-                whole = self.state_layout.kind(name) == "integer"
-                row = self.integers if whole else self.records
-                row[0, self.state_layout.offsets[name], 0] = value.data
+                self._stored(name)[:] = value.data
+
+    def _stored(self, name: str) -> NDArray[Any]:
+        """View of a number of the record, shape (1,)."""
+        is_integer = self.state_layout.kind(name) == "integer"
+        return (self.integers if is_integer else self.records)[0, self.state_layout.offsets[name]]
 
     def _integrated(self, count: int) -> ControlStepGraph:
         """Integrate over the control step; return the parts of the step at its end."""
