@@ -28,28 +28,16 @@ class PlainEngine(Engine):
     See `Engine` for arguments and attributes.
     """
 
-<<<<<<< HEAD
-    _drawn: Model | None = None
-=======
     _station: Model | None = None
->>>>>>> plain
 
     @property
     def plain(self) -> PlainPlant:
         """The episode's plant in plain Python, made anew for a drawn station."""
-<<<<<<< HEAD
-        if self._drawn is not self.models[0]:
-            self._drawn = self.models[0]
-            system = self.nominal.program.zero_order_hold
-            watched = course(system.equations, system.attempt, self.task).values
-            self._plain = PlainPlant(Plant(self._drawn, self.nominal.tolerance), watched)
-=======
         if self._station is not self.models[0]:
             self._station = self.models[0]
             system = self.nominal.program.zero_order_hold
             watched = course(system.equations, system.attempt, self.task).values
             self._plain = PlainPlant(Plant(self._station, self.nominal.tolerance), watched)
->>>>>>> plain
         return self._plain
 
     def advance(
