@@ -183,9 +183,11 @@ def test_names_in_written_workbooks_are_text(tmp_path, text):
     assert read_trial(path).provenance["model"] == text.replace("\x01", "\ufffd")
 
 
-ENTITIES = b"".join(b'<!ENTITY e%d "%s">' % (k + 1, b"&e%d;" % k * 10) for k in range(15))
+ENTITIES = b'<!DOCTYPE x [<!ENTITY e0 "aaaaaaaaaa">%s]>' % b"".join(
+    b'<!ENTITY e%d "%s">' % (k + 1, b"&e%d;" % k * 10) for k in range(15)
+)
 HURTS = {
-    "wide": (b'<row><c r="XFD1"><v>1</v></c></row>' * 1000, "of 1000 columns a table: it has 16384"),
+    "wide": (b'<row><c r="XFD1"><v>1</v></c></row>' * 1000, "of 1000 columns a table: it has"),
     "far": (b'<row r="1048576"><c r="A1048576"><v>1</v></c></row>', "no header: row 1048576"),
     "row": (b'<row r="9999999"/>', "a.xlsx cannot be read: damaged"),
     "column": (b'<row><c r="ZZZZ1"/></row>', "a.xlsx cannot be read: damaged"),
@@ -205,10 +207,7 @@ HURTS = {
 @pytest.mark.parametrize("name", HURTS)
 def test_a_workbook_that_hurts_is_refused_before_the_memory_is_taken(tmp_path, monkeypatch, name):
     path, (body, message) = tmp_path / "a.xlsx", HURTS[name]
-    head = (
-        b'<!DOCTYPE x [<!ENTITY e0 "aaaaaaaaaa">' + ENTITIES + b"]>" if name == "entities" else b""
-    )
-    head += (
+    head = (ENTITIES if name == "entities" else b"") + (
         b'<worksheet xmlns="http://schemas.openxmlformats.org/spreadsheetml/2006/main"><sheetData>'
     )
     book(path)
