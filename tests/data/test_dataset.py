@@ -36,11 +36,18 @@ def columns(**changed):
 def write(path, **changed):
     """A CSV file of `columns`; a string stands as it is in every row."""
     table = columns(**changed)
-    rows = [
-        ",".join(str(values if isinstance(values, str) else values[i]) for values in table.values())
-        for i in range(ROWS)
-    ]
-    path.write_text("\n".join([",".join(table), *rows]) + "\n")
+    rows = zip(*([v] * ROWS if isinstance(v, str) else v for v in table.values()), strict=True)
+    path.write_text("\n".join([",".join(table), *(",".join(map(str, row)) for row in rows)]) + "\n")
+
+
+def spoilt(name, value, *rows):
+    """A column with some readings replaced."""
+    values = NORMAL[name].copy()
+    values[list(rows)] = value
+    return {name: values}
+
+
+NORMAL = columns()
 
 
 @pytest.fixture
@@ -63,12 +70,15 @@ def describe(folder, text):
 
 
 def test_a_folder_of_csv_files_is_a_data_set(folder):
-    for name in ("ramp10.csv", "ramp2.csv", ".hidden.csv", "~$ramp2.xlsx"):
+    for name in ("ramp10.csv", "ramp2.csv", ".hidden.csv", "~$ramp2.xlsx", "next.csv"):
         write(folder / name)
     (folder / "model.toml").write_text("")
     (folder / "old").mkdir()
     write(folder / "old" / "ramp3.csv")
-    with pytest.warns(TrialWarning, match=r"^~\$ramp2.xlsx is passed over: .* locks an open file"):
+    with (
+        pytest.warns(TrialWarning, match=r"^~\$ramp2.xlsx is passed over: .* locks an open file"),
+        pytest.warns(TrialWarning, match="next.csv is passed over"),
+    ):
         dataset = read_dataset(folder)
     assert [each.name for each in dataset.trials] == ["ramp2.csv", "ramp10.csv"]
     assert (dataset.title, dataset.model, len(dataset)) == ("lab", None, 2)
@@ -78,8 +88,8 @@ def test_a_folder_of_csv_files_is_a_data_set(folder):
 
 
 def test_a_description_names_title_model_columns_and_trials(folder):
-    write(folder / "a.csv", contraction_mm=None, Weg=60.0 - columns()["contraction_mm"])
-    write(folder / "b.csv", contraction_mm=None, Weg=60.0 - columns()["contraction_mm"])
+    for name in ("a.csv", "b.csv"):
+        write(folder / name, contraction_mm=None, Weg=60.0 - NORMAL["contraction_mm"])
     describe(
         folder,
         """
@@ -99,25 +109,20 @@ def test_a_description_names_title_model_columns_and_trials(folder):
     second = dataset.trials[1]
     assert (second.order, second.repeat_of, second.note) == (2, "a.csv", "after lunch")
     assert second.trial.measurements["contraction"][0] == pytest.approx(40e-3)
-
-
-def test_a_shipped_model_stays_a_name(folder):
-    write(folder / "a.csv")
-    describe(folder, 'model = "serres2008"')
+    # A shipped model stays a name.
+    describe(folder, 'model = "serres2008"\n[columns]\n"Weg" = "contraction_mm"')
     assert read_dataset(folder).model == "serres2008"
 
 
 def test_parquet_and_xlsx_are_trials_too(folder):
     pytest.importorskip("pyarrow")
     pytest.importorskip("openpyxl")
-    time = np.arange(4.0)
-    trial = Trial(time, {"motor_voltage": time}, {"load": 100.0 * time})
-    for name in ("a.parquet", "b.xlsx", "c.csv"):
-        write_trial(trial, folder / name)
-    loads = [each.trial.measurements["load"] for each in read_dataset(folder).trials]
-    assert len(loads) == 3
-    for load in loads:
-        np.testing.assert_allclose(load, 100.0 * time)
+    time, names = np.arange(4.0), ("a.parquet", "b.xlsx", "c.csv")
+    for name in names:
+        write_trial(Trial(time, {"motor_voltage": time}, {"load": 100.0 * time}), folder / name)
+    trials = read_dataset(folder).trials
+    assert tuple(each.name for each in trials) == names
+    np.testing.assert_allclose([e.trial.measurements["load"] for e in trials], [100.0 * time] * 3)
 
 
 def test_a_folder_that_is_none_is_refused(folder, tmp_path):
@@ -184,12 +189,6 @@ def test_a_description_under_another_name_is_refused(folder):
         assert "must be called dataset.toml" in refusal(folder)
 
 
-def only_contraction(name):
-    """A file whose one measurement goes by another name."""
-    gone = dict.fromkeys(("rotation_deg", "load_n", "pressure_kpa", "contraction_mm"))
-    return gone | {name: columns()["contraction_mm"]}
-
-
 @pytest.mark.parametrize(
     ("name", "line"),
     [
@@ -200,32 +199,13 @@ def only_contraction(name):
     ],
 )
 def test_a_look_alike_of_the_only_measurement_is_refused(folder, name, line):
-    write(folder / "ramp.csv", **only_contraction(name))
+    gone = dict.fromkeys(("rotation_deg", "load_n", "pressure_kpa", "contraction_mm"))
+    write(folder / "ramp.csv", **gone, **{name: NORMAL["contraction_mm"]})
     message = refusal(folder)
     assert "ramp.csv has no measurement" in message
     assert "looks like" in message and message.endswith(line)
 
 
-def test_a_look_alike_beside_measurements_is_warned_of_once(folder):
-    for name in ("a.csv", "b.csv"):
-        write(folder / name, load_n=None, Load_kN=columns()["load_n"] / 1e3, Temp="21")
-    with pytest.warns(TrialWarning) as caught:
-        read_dataset(folder)
-    (message,) = (str(warning.message) for warning in caught)
-    assert message.startswith(
-        "all files: unknown columns are ignored: 'Load_kN', 'Temp'; 'Load_kN'"
-    )
-    assert message.endswith('"Load_kN" = { name = "load_n", factor = 1000 }')
-
-
-def test_a_proposed_experiment_is_no_trial(folder):
-    write(folder / "a.csv")
-    write(folder / "next.csv")
-    with pytest.warns(TrialWarning, match="next.csv is passed over"):
-        assert len(read_dataset(folder)) == 1
-
-
-NORMAL = columns()
 SLIPS = {
     "contraction_mm": [
         (1e-3, "metres, or its sensor was not connected", "factor = 1000"),
@@ -281,8 +261,7 @@ def test_what_may_rightly_stand_still_is_read(folder):
     """A hold: commands do not move, so nothing needs to."""
     still = {name: np.full(ROWS, NORMAL[name][0]) for name in NORMAL if name != "time_s"}
     write(folder / "hold.csv", **still)
-    slack = {"motor_voltage_v": 0.0 * NORMAL["time_s"], "rotation_deg": 0.0 * NORMAL["time_s"]}
-    write(folder / "slack.csv", **slack, load_n=None)
+    write(folder / "slack.csv", motor_voltage_v="0.0", rotation_deg="0.0", load_n=None)
     assert len(read_dataset(folder)) == 2
 
 
@@ -311,29 +290,22 @@ def test_a_broken_file_is_named(folder):
 
 @pytest.mark.parametrize("outlier", [-4321.5, 1e6])
 def test_a_unit_is_not_guessed_from_one_reading(folder, outlier):
-    spoiled = NORMAL["contraction_mm"].copy()
-    spoiled[20] = outlier
-    write(folder / "ramp.csv", contraction_mm=spoiled)
+    write(folder / "ramp.csv", **spoilt("contraction_mm", outlier, 20))
     message = refusal(folder)
     assert re.match(r"contraction_mm is \S+ mm in row 22, beyond the 250 mm that a muscle", message)
     assert message.endswith("empty these cells if nothing was measured there")
-    spoiled[20] = np.nan
-    write(folder / "ramp.csv", contraction_mm=spoiled)
+    write(folder / "ramp.csv", **spoilt("contraction_mm", np.nan, 20))
     assert len(read_dataset(folder)) == 1
 
 
 def test_a_wild_reading_is_warned_of(folder):
-    spoiled = NORMAL["load_n"].copy()
-    spoiled[20] = 54321.5
-    write(folder / "ramp.csv", load_n=spoiled)
+    write(folder / "ramp.csv", **spoilt("load_n", 54321.5, 20))
     with pytest.warns(TrialWarning, match="load_n is 54321.5 N in row 22, far from its other rea"):
         assert len(read_dataset(folder)) == 1
 
 
 def test_a_mark_of_nothing_measured_is_no_unit(folder):
-    spoiled = NORMAL["contraction_mm"].copy()
-    spoiled[[10, 20, 30]] = -999.0
-    write(folder / "ramp.csv", contraction_mm=spoiled)
+    write(folder / "ramp.csv", **spoilt("contraction_mm", -999.0, 10, 20, 30))
     message = refusal(folder)
     assert "contraction_mm of ramp.csv is -999 in row 12, 22, 32, while" in message
     assert "micrometres" not in message
@@ -342,10 +314,23 @@ def test_a_mark_of_nothing_measured_is_no_unit(folder):
     assert np.isnan(trial.trial.measurements["contraction"]).sum() == 3
 
 
-def test_a_degree_sign_is_a_unit_of_a_look_alike(folder):
-    write(folder / "ramp.csv", **{"rotation_deg": None, "Angle (°)": NORMAL["rotation_deg"]})
-    with pytest.warns(TrialWarning, match='"Angle .°." = "rotation_deg"$'):
+@pytest.mark.parametrize(
+    ("gone", "there", "said"),
+    [
+        (
+            "load_n", {"Load_kN": NORMAL["load_n"] / 1e3, "Temp": "21"},
+            "^all files: unknown columns are ignored: 'Load_kN', 'Temp'; 'Load_kN'"
+            '.*"Load_kN" = { name = "load_n", factor = 1000 }$',
+        ),
+        ("rotation_deg", {"Angle (°)": NORMAL["rotation_deg"]}, '"Angle .°." = "rotation_deg"$'),
+    ],
+)  # fmt: skip
+def test_a_look_alike_beside_measurements_is_warned_of_once(folder, gone, there, said):
+    for name in ("a.csv", "b.csv"):
+        write(folder / name, **{gone: None, **there})
+    with pytest.warns(TrialWarning, match=said) as caught:
         read_dataset(folder)
+    assert len(caught) == 1
 
 
 def test_what_a_lab_states_of_its_sensors_is_read(folder):

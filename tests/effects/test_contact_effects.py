@@ -50,43 +50,36 @@ def test_drag_lets_a_joint_run_up_to_where_it_takes_all_torque():
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_damping_by_direction_brakes_one_way_and_pushes_the_other(sign):
+def test_damping_and_gain_by_direction_are_larger_forwards(sign):
     damped = joint(
         joint_damping={"coefficient_n_m_s": 0.1},
         joint_directional_damping={"difference_n_m_s": 0.1},
     )
     _, truth = held(damped, "torque_command", sign * TORQUE, 4.0)
     assert truth["speed"][-1] == pytest.approx(sign * TORQUE / (0.1 + sign * 0.05), rel=1e-4)
-
-
-@pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_a_gain_by_direction_is_larger_forwards(sign):
-    uneven = joint(directional_gain={"difference_percent": 20.0})
-    time, truth = held(uneven, "torque_command", sign * TORQUE)
+    uneven = {"directional_gain": {"difference_percent": 20.0}}
+    time, truth = held(joint(**uneven), "torque_command", sign * TORQUE)
     gained = sign * TORQUE * (1.0 + 0.1 * sign)
     np.testing.assert_allclose(truth["speed"], gained / INERTIA * time, rtol=1e-6)
-
-
-@pytest.mark.parametrize("load", [50.0, -50.0])
-def test_a_slides_gain_by_direction_goes_with_the_side_it_is_pushed_to(load):
-    _, truth = held(slide(directional_gain={"difference_percent": 20.0}), "load_command", load, 0.2)
     # A load pulls out: a negative one pushes forwards.
-    forwards = -load * (1.0 + 0.1 * np.sign(-load))
+    _, truth = held(slide(**uneven), "load_command", -sign * 50.0, 0.2)
+    forwards = sign * 50.0 * (1.0 + 0.1 * sign)
     assert truth["contraction"][-1] == pytest.approx(0.5 * forwards / 2.0 * 0.2**2, rel=1e-6)
 
 
-@pytest.mark.parametrize("torque", [0.2, 1.0])
-def test_friction_by_load_takes_a_share_of_the_drives_torque(torque):
-    rubbing = joint(
-        joint_load_friction={
-            "drive_share_percent": 30.0,
-            "carried_share_percent": 0.0,
-            "presliding_deg": 0.01,
-        }
-    )
-    time, truth = held(rubbing, "torque_command", torque)
+@pytest.mark.parametrize(
+    ("torque", "drive", "carried", "left"),
+    [(0.2, 30.0, 0.0, 0.14), (1.0, 30.0, 0.0, 0.7), (2.0, 0.0, 30.0, 2.0 - 1.0 - 0.3)],
+)
+def test_friction_by_load_takes_a_share_of_the_drives_torque_or_of_what_is_carried(
+    torque, drive, carried, left
+):
+    shares = {"drive_share_percent": drive, "carried_share_percent": carried}
+    tables = {"joint_load_friction": shares | {"presliding_deg": 0.01}}
+    tables |= {"constant_torque": {"torque_n_m": -1.0}} if carried else {}
+    time, truth = held(joint(**tables), "torque_command", torque)
     slope = np.polyfit(time[100:], truth["speed"][100:], 1)[0]
-    assert slope == pytest.approx(0.7 * torque / INERTIA, rel=1e-3)
+    assert slope == pytest.approx(left / INERTIA, rel=1e-3)
 
 
 TURNS = np.array([-10.0, -10.0, 3.0, 3.0, -7.0, 1.0, 1.0, -2.0, -2.0, 10.0])
@@ -103,35 +96,27 @@ def impulse(force, dt):
 @pytest.mark.parametrize("effect", ["gain", "friction"])
 def test_a_drive_that_turns_between_rows_is_integrated_exactly(rig, effect):
     """A slope that jumps behind a step's last stage shows in no error of it, at any tolerance."""
-    time = 2e-3 * np.arange(TURNS.size)
-    if rig == "slide":
-        dry = {"drive_share_percent": 20.0, "carried_share_percent": 0.0, "presliding_um": 1e-3}
-        name, command = "load_dependent_friction", {"load_command": -TURNS}
-        make, begun = slide, {"start.velocity_mm_per_s": 300.0}
-        inertia, speed = 2.0, "velocity"
-    else:
-        dry = {"drive_share_percent": 20.0, "carried_share_percent": 0.0, "presliding_deg": 1e-4}
-        name, command = "joint_load_friction", {"torque_command": TURNS}
-        make, begun = joint, {"joint_start.spin_deg_per_s": 1000.0}
-        inertia, speed = INERTIA, "speed"
-    tables = (
-        {name: dry} if effect == "friction" else {"directional_gain": {"difference_percent": 20.0}}
-    )
-    share = -0.2 if effect == "friction" else 0.1
-    held_at = Plant(make(**tables).replace(begun), 1e-8).simulate(Trial(time, command), noise=False)
+    make, friction, presliding, command, sign, start, inertia, speed = {
+        "slide": (
+            *(slide, "load_dependent_friction", {"presliding_um": 1e-3}, "load_command", -1.0),
+            *({"start.velocity_mm_per_s": 300.0}, 2.0, "velocity"),
+        ),
+        "joint": (
+            *(joint, "joint_load_friction", {"presliding_deg": 1e-4}, "torque_command", 1.0),
+            *({"joint_start.spin_deg_per_s": 1000.0}, INERTIA, "speed"),
+        ),
+    }[rig]
+    shares = {"drive_share_percent": 20.0, "carried_share_percent": 0.0}
+    tables, share = {
+        "friction": ({friction: shares | presliding}, -0.2),
+        "gain": ({"directional_gain": {"difference_percent": 20.0}}, 0.1),
+    }[effect]
+    trial = Trial(2e-3 * np.arange(TURNS.size), {command: sign * TURNS})
+    truth = Plant(make(**tables).replace(start), 1e-8).simulate(trial, noise=False).truth[speed]
     gained = 0.5 * (TURNS[:-1] + TURNS[1:]) * 2e-3 + share * impulse(TURNS, 2e-3)
     # The bristles deflect in the first of the intervals.
-    changes = np.diff(held_at.truth[speed])[1:]
-    assert (held_at.truth[speed] > 0.0).all()
-    np.testing.assert_allclose(changes, gained[1:] / inertia, rtol=1e-4)
-
-
-def test_friction_by_load_takes_a_share_of_what_a_joint_carries():
-    shares = {"drive_share_percent": 0.0, "carried_share_percent": 30.0, "presliding_deg": 0.01}
-    model = joint(joint_load_friction=shares, constant_torque={"torque_n_m": -1.0})
-    time, truth = held(model, "torque_command", 2.0)
-    slope = np.polyfit(time[100:], truth["speed"][100:], 1)[0]
-    assert slope == pytest.approx((2.0 - 1.0 - 0.3) / INERTIA, rel=1e-3)
+    assert (truth > 0.0).all()
+    np.testing.assert_allclose(np.diff(truth)[1:], gained[1:] / inertia, rtol=1e-4)
 
 
 def test_a_hardening_spring_swings_faster_where_it_swings_further():

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from pma_gym.data.trial import Trial
 from pma_gym.effects import CATALOGUE
 from pma_gym.effects.delay import (
     DriveDelay,
@@ -144,14 +143,3 @@ def test_a_cascade_has_a_delayed_regulator_too():
         return time[np.argmax(plant.observe(states, zero)["pressure"] > 325e3)]
 
     assert half(late) - half(plain) == pytest.approx(0.02, abs=0.002)
-
-
-def test_a_delayed_station_is_simulated_as_a_trial(station_with):
-    plant = station_with("regulator_delay")
-    time = np.linspace(0.0, 1.0, 101)
-    commands = {
-        "motor_voltage": np.full(101, 1.0),
-        "regulator_voltage": np.where(time > 0.2, 6.0, 5.0),
-    }
-    logged = plant.simulate(Trial(time=time, commands=commands, measurements={}), noise=False)
-    assert np.ptp(logged.measurements["pressure"][time <= 0.2]) < 1.0

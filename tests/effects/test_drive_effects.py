@@ -11,7 +11,7 @@ from pma_gym.effects import CATALOGUE
 from pma_gym.effects.arithmetic import cosine
 from pma_gym.effects.drive.current_imbalance import imbalance_load
 from pma_gym.effects.drive.drive_dead_zone import load_beyond_dead_zone
-from pma_gym.effects.drive.drive_lag import late_load, late_rate
+from pma_gym.effects.drive.drive_lag import late_load
 from pma_gym.effects.drive.torque_ripple import ripple_load
 from pma_gym.plant.equilibrium.solver import equilibria_at
 
@@ -30,18 +30,27 @@ def asked(plant, voltages=VOLTAGES):
     return np.maximum(0.0, drive.gain * voltages + drive.offset)
 
 
-def test_a_dead_zone_misses_the_start_and_catches_up(station_with):
-    plant = station_with("drive_dead_zone", width_n=15.0)
-    plain, loads = asked(plant), held_loads(plant)
-    expected = np.where(plain < 15.0, 0.0, np.minimum(plain, 2.0 * (plain - 15.0)))
-    np.testing.assert_allclose(loads, expected, rtol=1e-8, atol=1e-7)
-    assert loads[1] == pytest.approx(0.0, abs=1e-9) and plain[1] > 5.0
-    np.testing.assert_allclose(loads[-3:], plain[-3:], rtol=1e-9)
+@pytest.mark.parametrize(
+    ("name", "values", "law"),
+    [
+        (
+            "drive_dead_zone",
+            {"width_n": 15.0},
+            lambda f: np.minimum(f, 2 * np.maximum(f - 15, 0)),
+        ),
+        ("drive_saturation", {"limit_n": 150.0}, lambda f: np.minimum(f, 150.0)),
+        ("drive_lag", {}, lambda f: f),  # statically absent
+    ],
+)
+def test_loads_at_rest(station_with, name, values, law):
+    plant = station_with(name, **values)
+    np.testing.assert_allclose(held_loads(plant), law(asked(plant)), rtol=1e-8, atol=1e-7)
 
 
 @pytest.mark.parametrize("slope", [1.2, 2.0, 4.0])
 def test_a_dead_zone_neither_pushes_nor_falls_and_ends(slope):
-    p = CATALOGUE["drive_dead_zone"].parse({"width_n": 15.0, "slope": slope})
+    effect = CATALOGUE["drive_dead_zone"]
+    p, none = (effect.parse({"width_n": width, "slope": slope}) for width in (15.0, 0.0))
     asked = np.linspace(0.0, 100.0, 401)
     loads = np.array([load_beyond_dead_zone(load, p) for load in asked])
     assert np.all(loads >= 0.0) and np.all(np.diff(loads) >= 0.0)
@@ -49,37 +58,9 @@ def test_a_dead_zone_neither_pushes_nor_falls_and_ends(slope):
     np.testing.assert_array_equal(loads[ended], asked[ended])
     within = (asked > 0.0) & (asked < 15.0 * slope / (slope - 1.0) - 1e-9)
     assert np.all(loads[within] < asked[within])
-
-
-@pytest.mark.parametrize("slope", [1.2, 2.0, 4.0])
-def test_without_a_width_the_slope_does_nothing(slope):
-    p = CATALOGUE["drive_dead_zone"].parse({"width_n": 0.0, "slope": slope})
-    loads = [0.0, 1e-300, 1e-9, 0.1, 1.0 / 3.0, 976.0]
-    assert [load_beyond_dead_zone(load, p) for load in loads] == loads
-
-
-def test_a_file_from_before_the_slope_means_2():
-    effect = CATALOGUE["drive_dead_zone"]
-    old = effect.parse({"width_n": 15.0})
-    assert old == effect.parse({"width_n": 15.0, "slope": 2.0}) and old.slope == 2.0
-    loads = np.linspace(0.0, 100.0, 401)
-    np.testing.assert_array_equal(
-        [load_beyond_dead_zone(load, old) for load in loads],
-        np.minimum(loads, 2.0 * np.maximum(loads - 15.0, 0.0)),
-    )
-    with pytest.raises(ValueError, match=r"takes width_n, slope; unknown: slop, missing: none"):
-        effect.parse({"width_n": 15.0, "slop": 2.0})
-    with pytest.raises(ValueError, match=r"unknown: none, missing: width_n"):
-        effect.parse({"slope": 2.0})
-    with pytest.raises(ValueError, match=r"drive_dead_zone.slope must lie in 1.2 to 4"):
-        effect.parse({"width_n": 15.0, "slope": 1.0})
-
-
-def test_a_saturated_drive_clips_its_tops(station_with):
-    plant = station_with("drive_saturation", limit_n=150.0)
-    np.testing.assert_allclose(
-        held_loads(plant), np.minimum(asked(plant), 150.0), rtol=1e-8, atol=1e-7
-    )
+    # Without a width the slope does nothing.
+    for load in (0.0, 1e-300, 1e-9, 0.1, 1.0 / 3.0, 976.0):
+        assert load_beyond_dead_zone(load, none) == load
 
 
 @pytest.mark.parametrize("share", [1.0, 0.4])
@@ -95,13 +76,6 @@ def test_a_late_drive_follows_a_step_exponentially(station_with, share):
         arrived = late_load(after, rest.state[at], p)
         expected = after - share * (after - before) * np.exp(-0.01 * i / 0.02)
         assert arrived == pytest.approx(expected, rel=1e-5)
-
-
-def test_a_late_drive_is_statically_absent(station_with):
-    plant = station_with("drive_lag")
-    np.testing.assert_allclose(held_loads(plant), asked(plant), rtol=1e-8, atol=1e-7)
-    source, decay = late_rate(300.0, plant.model.parameters["drive_lag"])
-    assert source / decay == pytest.approx(300.0)
 
 
 def test_a_late_drive_is_part_of_the_linear_system(station_with, station):

@@ -234,17 +234,23 @@ def test_what_cannot_be_used_is_refused_with_its_mend(name, write):
     assert before == CATALOGUE
 
 
-def test_a_file_that_is_none_is_refused(tmp_path):
-    with pytest.raises(OwnEffectError, match=r"cannot be read .*; name a Python file"):
-        load_effects(tmp_path / "nothing.py")
-    (tmp_path / "notes.txt").write_text("x = 1")
-    with pytest.raises(OwnEffectError, match=r"its name must end in .py"):
-        load_effects(tmp_path / "notes.txt")
+@pytest.mark.parametrize(
+    ("name", "content", "message"),
+    [
+        ("nothing.py", None, r"cannot be read .*; name a Python file"),
+        ("notes.txt", "x = 1", r"its name must end in .py"),
+        (f"my{os.pathsep}effects.py", None, r"in its path, which separates .*; rename it"),
+    ],
+)
+def test_a_file_that_is_none_is_refused(tmp_path, name, content, message):
+    if content is not None:
+        (tmp_path / name).write_text(content)
+    with pytest.raises(OwnEffectError, match=message):
+        load_effects(tmp_path / name)
 
 
 def test_two_files_cannot_have_one_name(write):
-    first = write(DRAG)
-    load_effects(first)
+    load_effects(write(DRAG))
     with pytest.raises(OwnEffectError, match=r"has a name that .*mine.py has already; choose"):
         load_effects(write(DRAG, "other.py"))
 
@@ -315,11 +321,15 @@ def test_an_effect_with_a_memory_settles_and_runs(write, station):
     assert (way(station) - way(plant)).max() > 1e-4
 
 
+DRAGGED = {"drag": {"factor_n_s2_per_mm2": 0.02}}
+STRONGER = DRAG.replace("-p.factor *", "-3.0 * p.factor *")
+
+
 @pytest.fixture
 def dragged(write, tmp_path, station):
     """A model with a user effect, saved beside its file, and pickled environments of it."""
     load_effects(write(DRAG))
-    model = station.model.with_effects({"drag": {"factor_n_s2_per_mm2": 0.02}}, name="dragged")
+    model = station.model.with_effects(DRAGGED, name="dragged")
     (tmp_path / "model.toml").write_text(dump_model(model))
     return model
 
@@ -328,7 +338,7 @@ def test_a_saved_model_names_the_file_and_the_law_of_its_user_effects(dragged, w
     saved = (tmp_path / "model.toml").read_text()
     assert load_model(tmp_path / "model.toml").parameters["drag"] == dragged.parameters["drag"]
     assert '\neffects_from = ["mine.py"]  # sha256 ' in saved
-    load_effects(write(DRAG.replace("-p.factor *", "-3.0 * p.factor *")))
+    load_effects(write(STRONGER))
     assert dump_model(dragged).partition("sha256")[0] == saved.partition("sha256")[0]
     assert dump_model(dragged) != saved
     assert "effects_from" not in dump_model(load_model("station"))
@@ -337,7 +347,7 @@ def test_a_saved_model_names_the_file_and_the_law_of_its_user_effects(dragged, w
 def test_what_a_diagnosis_keeps_depends_on_the_law_of_every_user_effect(write, station):
     load_effects(write(DRAG))
     before = digest((), station.model, "")
-    load_effects(write(DRAG.replace("-p.factor *", "-3.0 * p.factor *")))
+    load_effects(write(STRONGER))
     assert digest((), station.model, "") != before
 
 
@@ -399,11 +409,6 @@ def test_the_variable_names_files_of_which_one_may_be_wrong(write, monkeypatch):
         with pytest.raises(OwnEffectError, match=r"^PMA_GYM_EFFECTS names .*gone.py: cannot be"):
             load_model("station")
     assert "drag" in CATALOGUE
-
-
-def test_a_file_whose_path_the_variable_cannot_have_is_refused(tmp_path):
-    with pytest.raises(OwnEffectError, match=r"in its path, which separates .*; rename it"):
-        load_effects(tmp_path / f"my{os.pathsep}effects.py")
 
 
 AXIS = (

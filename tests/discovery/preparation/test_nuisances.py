@@ -211,9 +211,9 @@ def test_only_mains_and_their_aliases_are_lines() -> None:
 
 
 def test_a_small_harmonic_counts_beside_a_line_of_the_same_mains() -> None:
-    """Of 8 % of the noise it adds up over a long trial; alone it is none."""
-    logged, left = _humming([50.0, 50.01] * 2, 70.0)
-    small = 0.08 * np.sqrt(2.0) * LEVEL * np.sin(2.0 * np.pi * 150.0 * logged[0].time)
+    """Of 12 % of the noise it adds up over long trials; alone it is none."""
+    logged, left = _humming([50.0, 50.01], 70.0)
+    small = 0.12 * np.sqrt(2.0) * LEVEL * np.sin(2.0 * np.pi * 150.0 * logged[0].time)
     rng = np.random.default_rng(8)
     alone = [part * np.nan for part in left]
     for part in alone:

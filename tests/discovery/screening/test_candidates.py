@@ -68,9 +68,6 @@ def test_names_are_unique_and_none_is_already_in_the_model():
             # Then it is a number at its neutral value, or a sensor's bandwidth.
             assert candidate.name != candidate.effect
             assert len(candidate.paths) == 1
-
-
-def test_what_a_model_has_is_no_candidate():
     having = STATION.with_effects({"hysteresis": {"force_n": 3.0, "distance_mm": 1.0}})
     assert "hysteresis" not in {candidate.name for candidate in candidate_effects(having)}
 
@@ -104,47 +101,35 @@ def test_probes_lie_within_bounds_and_are_each_different(name):
     assert len({tuple(row) for row in candidate.probes}) == len(candidate.probes)
     assert not any(np.array_equal(row, candidate.absent) for row in candidate.probes)
     assert len(candidate.probes) == len(candidate.signs)
-    for probe in range(len(candidate.probes)):
-        for factor in (-8.0, -1.0, 0.1, 8.0, 1e6):
-            if factor > 0.0 or candidate.signs[probe]:
-                grown = candidate.grown(probe, factor)
-                assert np.all((grown >= lower) & (grown <= upper))
-                assert np.isfinite(grown).all()
-
-
-@pytest.mark.parametrize("name", BY_NAME)
-def test_growing_by_one_changes_nothing(name):
-    candidate = BY_NAME[name]
     for probe, row in enumerate(candidate.probes):
         np.testing.assert_allclose(candidate.grown(probe, 1.0), row, rtol=1e-12)
+        for factor in (-8.0, -1.0, 0.1, 8.0, 1e6):
+            if factor > 0.0 or candidate.signs[probe]:
+                # Also finite, as these bounds are.
+                grown = candidate.grown(probe, factor)
+                assert np.all((grown >= lower) & (grown <= upper))
 
 
-def test_growing_scales_the_size_and_not_the_shape():
-    candidate = BY_NAME["hysteresis"]
-    size, shape = (candidate.paths.index(f"hysteresis.{p}") for p in ("force_n", "distance_mm"))
+@pytest.mark.parametrize(
+    ("name", "factor", "expected"),
+    [
+        ("hysteresis", 1.5, {"force_n": lambda x: 1.5 * x, "distance_mm": lambda x: x}),
+        # A delay grows from nothing.
+        ("regulator_delay", 0.5, {"delay_ms": lambda x: 0.5 * x}),
+        # The opposite of a wave is half a period later.
+        ("torque_ripple", -0.5, {"amplitude_percent": lambda x: 0.5 * x}),
+    ],
+)
+def test_growing_scales_the_size_and_not_the_shape(name, factor, expected):
+    candidate = BY_NAME[name]
     for probe, row in enumerate(candidate.probes):
-        grown = candidate.grown(probe, 1.5)
-        assert grown[size] == pytest.approx(1.5 * row[size])
-        assert grown[shape] == row[shape]
-
-
-def test_the_opposite_of_a_wave_is_half_a_period_later():
-    candidate = BY_NAME["torque_ripple"]
-    phase = candidate.paths.index("torque_ripple.phase_deg")
-    size = candidate.paths.index("torque_ripple.amplitude_percent")
-    for probe, row in enumerate(candidate.probes):
-        grown = candidate.grown(probe, -0.5)
-        assert grown[size] == pytest.approx(0.5 * row[size])
-        assert abs(grown[phase] - row[phase]) == 180.0
-        assert np.cos(np.radians(grown[phase])) == pytest.approx(-np.cos(np.radians(row[phase])))
-
-
-def test_a_delay_grows_from_nothing():
-    candidate = BY_NAME["regulator_delay"]
-    delay = candidate.paths.index("regulator_delay.delay_ms")
-    assert candidate.fitted_paths == ["regulator_delay.delay_ms"]
-    for probe, row in enumerate(candidate.probes):
-        assert candidate.grown(probe, 0.5)[delay] == pytest.approx(0.5 * row[delay])
+        grown = dict(zip(candidate.paths, candidate.grown(probe, factor), strict=True))
+        for path, value in zip(candidate.paths, row, strict=True):
+            key = path.partition(".")[2]
+            if key == "phase_deg":
+                assert abs(grown[path] - value) == 180.0
+            elif key in expected:
+                assert grown[path] == pytest.approx(expected[key](value))
 
 
 def test_limits_are_looked_for_over_a_range_and_do_not_scale():

@@ -8,7 +8,7 @@ import pytest
 
 from pma_gym.data.trial import Trial
 from pma_gym.discovery.fitting.fit_problem import FitProblem
-from pma_gym.discovery.fitting.free_parameters import free_parameters
+from pma_gym.discovery.fitting.free_parameters import free_parameters, values
 from pma_gym.discovery.fitting.journal import Journal
 from pma_gym.discovery.preparation.noise import white_noise
 from pma_gym.discovery.screening.candidates import candidate_effects
@@ -37,21 +37,14 @@ def selected(case, seed=0):
     return shared, refitted, select(shared, refitted, CANDIDATES, seed, journal, lambda *_: None)
 
 
-def test_hysteresis_is_found_with_its_size():
+def test_hysteresis_is_found_with_its_size_and_parameters_come_right_beside_it():
     _, refitted, stage = selected("hysteresis")
     assert [candidate.name for candidate in stage.chosen] == ["hysteresis"]
-    for path, truth in (("hysteresis.force_n", 6.0), ("hysteresis.distance_mm", 1.0)):
+    sizes = {"hysteresis.force_n": 6.0, "hysteresis.distance_mm": 1.0}
+    for path, truth in (sizes | OFF).items():
         value, error = stage.fit.estimate(path)
-        assert abs(value - truth) < 3.0 * error
-        assert error < 0.1 * truth
+        assert abs(value - truth) < 3.5 * error and (path in OFF or error < 0.1 * truth)
     assert stage.fit.chi_square < 0.7 * refitted.chi_square
-
-
-def test_parameters_come_right_only_beside_the_effect():
-    _, refitted, stage = selected("hysteresis")
-    for path, truth in OFF.items():
-        value, error = stage.fit.estimate(path)
-        assert abs(value - truth) < 3.5 * error
     # Damping takes what hysteresis loses, as long as that is missing.
     truth = STATION.values_in_files("damping")["contracting_n_s_per_mm"]
     wrong, right = (
@@ -64,105 +57,70 @@ def test_parameters_come_right_only_beside_the_effect():
 @pytest.mark.parametrize("case", ["nothing", "parameters"])
 def test_nothing_hidden_nothing_found(case):
     shared, refitted, stage = selected(case)
-    assert stage.chosen == ()
-    assert len(stage.stages) == 1
-    assert stage.stages[0].gate == () and stage.stages[0].fits == {}
+    (first,) = stage.stages
+    assert stage.chosen == first.gate == () and first.fits == {}
     expected = shared.whitened_residuals(refitted.model).count
     assert abs(refitted.chi_square - expected) < 5 * np.sqrt(2 * expected)
 
 
 def test_the_chosen_lead_their_rounds():
     _, _, stage = selected("hysteresis")
-    first = stage.stages[0]
+    first, second = stage.stages
     assert all(passes(first.problem, each, first.missing) for each in first.gate)
     assert first.missing or all(each.p_value <= ALARM for each in first.gate)
     assert "hysteresis" in {each.candidate.name for each in first.gate}
     assert min(first.fits, key=lambda name: cost(first.fits[name])) == "hysteresis"
-    assert [each.gain for each in first.scores] == sorted(
-        (each.gain for each in first.scores), reverse=True
-    )
-
-
-def test_every_fit_explains_more_than_without():
-    _, _, stage = selected("hysteresis")
-    first = stage.stages[0]
+    gains = [each.gain for each in first.scores]
+    assert gains == sorted(gains, reverse=True)
     for name, fit in first.fits.items():
         assert fit.chi_square <= first.before.chi_square, name
-        assert fit.names == (name,)
-        assert set(first.before.paths) < set(fit.paths)
+        assert fit.names == (name,) and set(first.before.paths) < set(fit.paths)
+    # What was added is not looked for again.
+    assert "hysteresis" not in {each.candidate.name for each in second.scores}
 
 
-def test_what_was_added_is_not_looked_for_again():
-    _, _, stage = selected("hysteresis")
-    assert len(stage.stages) == 2
-    assert "hysteresis" not in {each.candidate.name for each in stage.stages[1].scores}
-
-
-def test_learnt_noise_is_never_less_than_at_rest():
-    for case in ("hysteresis", "nothing"):
-        shared, _, stage = selected(case)
-        for before, after in zip(shared.noise, stage.problem.noise, strict=True):
-            assert after.level >= before.level
-            assert after.level < 1.15 * before.level
+@pytest.mark.parametrize("case", ["hysteresis", "nothing"])
+def test_learnt_noise_is_never_less_than_at_rest(case):
+    shared, _, stage = selected(case)
+    for before, after in zip(shared.noise, stage.problem.noise, strict=True):
+        assert before.level <= after.level < 1.15 * before.level
 
 
 def test_a_fit_comes_back_from_its_journal_bit_by_bit():
-    shared, _, stage = selected("hysteresis")
-    fit = stage.stages[0].fits["hysteresis"]
-    again = restored(kept_form(fit), shared, stage.stages[0].before, stage.chosen)
-    assert again.paths == fit.paths and again.names == fit.names
-    assert np.array_equal(again.values, fit.values)
-    assert again.chi_square == fit.chi_square
-    for path in fit.paths:
-        effect, _, file_key = path.partition(".")
-        assert (
-            again.model.values_in_files(effect)[file_key]
-            == fit.model.values_in_files(effect)[file_key]
-        )
-
-
-def test_a_delay_comes_back_from_its_journal_switched_on():
-    shared, refitted, _ = selected("hysteresis")
+    """A delay comes back switched on."""
+    shared, refitted, stage = selected("hysteresis")
     delay = next(each for each in CANDIDATES if each.name == "regulator_delay")
-    fit = shared.fit(refitted.model, (delay,), {"regulator_delay": delay.probes[0]})
-    again = restored(kept_form(fit), shared, refitted, (delay,))
-    assert again.model.values_in_files("regulator_delay") == fit.model.values_in_files(
-        "regulator_delay"
-    )
+    late = shared.fit(refitted.model, (delay,), {delay.name: delay.probes[0]})
+    first = stage.stages[0]
+    for fit, before, chosen in (
+        (first.fits["hysteresis"], first.before, stage.chosen),
+        (late, refitted, (delay,)),
+    ):
+        again = restored(kept_form(fit), shared, before, chosen)
+        assert (again.paths, again.names, again.model) == (fit.paths, fit.names, fit.model)
+        assert np.array_equal(again.values, fit.values) and again.chi_square == fit.chi_square
     assert again.model.values_in_files("regulator_delay")["share"] == 1.0
 
 
 def test_the_truth_is_hardly_better_than_what_was_found():
     """The search found the bottom: no model explains much more than the one that made the data."""
     shared, _, stage = selected("hysteresis")
-    truth = STATION.replace(OFF)
-    truth = truth.with_effects(HYSTERESIS)
+    truth = STATION.replace(OFF).with_effects(HYSTERESIS)
     whitened = shared.whitened_residuals(truth, stage.chosen)
-    begun = np.array([_value(truth, each.path) for each in whitened.free])
+    begun = values(truth, [each.path for each in whitened.free])
     there = whitened.sums(begun, np.empty(0)).chi_square
-    fitted = stage.stages[0].fits["hysteresis"]
-    assert fitted.chi_square < there + 10.0
-
-
-def _value(model, path):
-    effect, _, file_key = path.partition(".")
-    return model.values_in_files(effect)[file_key]
+    assert stage.stages[0].fits["hysteresis"].chi_square < there + 10.0
 
 
 def taut(effects, rate=128.0):
     """Trials of which one begins with a slack cable that comes taut once, slowly drawn."""
-    simulated = []
+    simulated, plant = [], Plant(STATION.with_effects(effects).replace(OFF))
     for number, asked in enumerate(commanded(3, rate)):
-        time = asked.time
-        motor, regulator = (
-            np.array(asked.commands[f"{name}_voltage"]) for name in ("motor", "regulator")
-        )
+        commands = {name: np.array(row) for name, row in asked.commands.items()}
         if number == 0:
-            motor = np.interp(time, [0.5, 2.0, 4.5], [0.0, 2.0, 0.5])
-            regulator += 1.0 * (time < 0.5)
-        commands = {"motor_voltage": motor, "regulator_voltage": regulator}
-        plant = Plant(STATION.with_effects(effects).replace(OFF))
-        simulated.append(plant.simulate(Trial(time, commands), seed=7 + number, noise=True))
+            commands["motor_voltage"] = np.interp(asked.time, [0.5, 2.0, 4.5], [0.0, 2.0, 0.5])
+            commands["regulator_voltage"] += 1.0 * (asked.time < 0.5)
+        simulated.append(plant.simulate(Trial(asked.time, commands), seed=7 + number, noise=True))
     return simulated
 
 
@@ -178,10 +136,6 @@ def by_bursts_alone(trials, monkeypatch):
     return scan_of_fit(shared, refitted), selection
 
 
-def readings(trials):
-    return fit_problem(trials).whitened_residuals(STATION).count
-
-
 @pytest.mark.campaign
 def test_a_beat_of_the_cable_opens_the_gate_for_what_makes_it(monkeypatch):
     trials = taut({"drive_dead_zone": {"width_n": 5.0, "slope": 2.0}})
@@ -191,7 +145,7 @@ def test_a_beat_of_the_cable_opens_the_gate_for_what_makes_it(monkeypatch):
     assert selection.stages[0].scores[0].p_value <= scan.chance
     assert selection.stages[0].scan == scan and selection.stages[1].scan.excess == 0.0
     assert selection.fit.estimate("drive_dead_zone.width_n")[0] == pytest.approx(5.0, rel=0.15)
-    assert selection.fit.chi_square < 1.05 * readings(trials)
+    assert selection.fit.chi_square < 1.05 * fit_problem(trials).whitened_residuals(STATION).count
 
 
 def test_a_cable_that_comes_taut_as_it_should_is_no_burst(monkeypatch):
@@ -202,18 +156,16 @@ def test_a_cable_that_comes_taut_as_it_should_is_no_burst(monkeypatch):
 
 @pytest.mark.campaign
 def test_noise_larger_in_places_bursts_but_names_nothing(monkeypatch):
-    trials, generator = [], np.random.default_rng(0)
-    for trial in taut({}):
-        row = {name: np.array(values) for name, values in trial.measurements.items()}
-        rows = slice(200, 264)
-        row["load"][rows] += 3.0 * generator.standard_normal(64)
-        trials.append(Trial(trial.time, trial.commands, row))
+    trials, generator = taut({}), np.random.default_rng(0)
+    for k, trial in enumerate(trials):
+        load = np.array(trial.measurements["load"])
+        load[200:264] += 3.0 * generator.standard_normal(64)
+        trials[k] = replace(trial, measurements={**trial.measurements, "load": load})
     scan, selection = by_bursts_alone(trials, monkeypatch)
+    (first, *_) = selection.stages
     assert scan.excess > 300.0
-    assert (
-        selection.chosen == () and selection.stages[0].gate == () and selection.stages[0].fits == {}
-    )
-    assert all(each.p_value > 1e-3 for each in selection.stages[0].scores)
+    assert selection.chosen == first.gate == () and first.fits == {}
+    assert all(each.p_value > 1e-3 for each in first.scores)
 
 
 @pytest.mark.parametrize(("change", "whole", "pieces"), [(0.3, 1, 1), (0.08, 0, 1), (0.03, 0, 0)])

@@ -5,6 +5,7 @@ Two effects of a free rig that is far from its model: found in short pieces of i
 
 import math
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -59,6 +60,13 @@ def fit_from(problem, *begun):
     return fit
 
 
+@cache
+def rubbing(lanes=2, seconds=0.5):
+    """A slide with 12 N of dry friction, and a fit of it near its size."""
+    problem = problem_of(driven_slide(12.0, lanes=lanes, seconds=seconds, rate=100))
+    return problem, fit_from(problem, 14.0, 12.0, 10.0)
+
+
 def test_a_fit_that_stops_far_off_is_begun_again_at_the_simpler_law():
     problem = problem_of(driven_slide(12.0, lanes=3, seconds=0.7, rate=100))
     fit = fit_from(problem, 30.0, 10.0, 0.5)
@@ -74,8 +82,7 @@ def test_a_fit_that_stops_far_off_is_begun_again_at_the_simpler_law():
 @pytest.mark.parametrize(("least", "begun"), [(96.0, FIRST), (94.0, len(STARTS))])
 def test_more_beginnings_are_tried_where_the_whole_law_explains_more(least, begun, monkeypatch):
     """Of a chi-square of 100 that one number leaves, it must explain 5 with the first of them."""
-    problem = problem_of(driven_slide(12.0, lanes=1, seconds=0.3, rate=100))
-    fit = fit_from(problem, 14.0, 12.0, 5.0)
+    problem, fit = rubbing(1, 0.3)
     left = iter([98.0, least, *([99.0] * len(STARTS))])
     monkeypatch.setattr(rugged_fits, "_simpler", lambda *_: replace(fit, chi_square=100.0))
     monkeypatch.setattr(FitProblem, "eased_fit", lambda *_: replace(fit, chi_square=next(left)))
@@ -84,8 +91,7 @@ def test_more_beginnings_are_tried_where_the_whole_law_explains_more(least, begu
 
 def test_no_start_lies_beyond_what_is_looked_for():
     """Friction of 9590 N m began at 1.1 times that: the catalogue ends at 10000, and no answer."""
-    problem = problem_of(driven_slide(12.0, lanes=1, seconds=0.3, rate=100))
-    fit = fit_from(problem, 14.0, 12.0, 5.0)
+    problem, fit = rubbing(1, 0.3)
     (tie,) = rugged_fits.ties(DRY)
     size = fit.estimate(DYNAMIC)[0]
     bounded = replace(DRY, highest={STATIC: 1.2 * size, DYNAMIC: 1.2 * size})
@@ -94,15 +100,13 @@ def test_no_start_lies_beyond_what_is_looked_for():
 
 
 def test_a_law_that_one_number_takes_the_place_of_is_not_refined():
-    problem = problem_of(driven_slide(12.0, lanes=2, seconds=0.5, rate=100))
-    fit = fit_from(problem, 14.0, 12.0, 10.0)
+    problem, fit = rubbing()
     below = replace(fit, values=np.where(np.array(fit.paths) == STATIC, 3.0, fit.values))
     assert settled(problem, below, (DRY,)) is below
 
 
 def test_a_refined_fit_explains_more_and_says_what_it_explains():
-    problem = problem_of(driven_slide(12.0, lanes=2, seconds=0.5, rate=100))
-    fit = fit_from(problem, 14.0, 12.0, 10.0)
+    problem, fit = rubbing()
     refit = refined(problem, fit, (DRY,))
     assert refit.chi_square < fit.chi_square
     again = problem.whitened_at(refit, (DRY,)).sums(refit.values, np.empty(0))
@@ -111,8 +115,7 @@ def test_a_refined_fit_explains_more_and_says_what_it_explains():
 
 def test_a_simplex_that_gains_nothing_is_followed_by_a_narrower_one(monkeypatch):
     """The same again ends the same: the second begins a quarter as wide, and shrinks."""
-    problem = problem_of(driven_slide(12.0, lanes=2, seconds=0.5, rate=100))
-    fit = fit_from(problem, 14.0, 12.0, 10.0)
+    problem, fit = rubbing()
     sizes = []
 
     def by_simplex(problem, fit, chosen, size, most):
@@ -130,8 +133,7 @@ def test_a_simplex_that_gains_nothing_is_followed_by_a_narrower_one(monkeypatch)
 
 
 def test_simplices_of_a_stiff_contact_stop_and_say_so(monkeypatch):
-    problem = problem_of(driven_slide(12.0, lanes=2, seconds=0.5, rate=100))
-    fit = fit_from(problem, 14.0, 12.0, 10.0)
+    problem, fit = rubbing()
     whole = refined(problem, fit, (DRY,))
     monkeypatch.setattr(derivative_free, "MOST_STEPS", 20_000)
     begun, simulated = [], FitProblem.whitened_at
