@@ -4,12 +4,18 @@ import numpy as np
 import pytest
 
 from pma_gym.envs import PMAVectorEnv
-from pma_gym.plant.model import load_model
+from pma_gym.plant.model import load_model, shipped_models
 from pma_gym.plant.sensors import noise_levels
 from pma_gym.tasks import EXERCISES, multisine
 
 EPISODE = 51
 """Steps of a displacement at 10 Hz."""
+
+LITERATURE = [
+    pytest.param(name, "rotation", marks=pytest.mark.campaign)
+    for name in sorted({*shipped_models()} - {"station", "cascade"})
+]
+"""The other models, whose laws are tested one by one in `tests/codegen`."""
 
 SEVERAL = {
     "randomisation": "varied", "action_delay_s": 0.2, "observation_delay_s": 0.3, "history": 2,
@@ -153,7 +159,9 @@ def test_each_environment_has_its_own_pressures(twins):
     assert set(listed) <= {300.0, 400.0} and len(set(drawn)) > 2
 
 
-@pytest.mark.parametrize(("model", "task"), [("station", "rotation"), ("cascade", "displacement")])
+@pytest.mark.parametrize(
+    ("model", "task"), [("station", "rotation"), ("cascade", "displacement"), *LITERATURE]
+)
 def test_single_precision_is_near(model, task):
     made = {"model": model, "noise": False, "pressure_kpa": "random"}
     envs = [PMAVectorEnv(17, task, precision=p, **made) for p in ("double", "single")]
@@ -186,10 +194,10 @@ def test_single_precision_gives_the_same_bits_in_any_batch():
 
 
 @pytest.mark.parametrize(
-    ("model", "task", "mode"),
-    [("station", "rotation", "NextStep"), ("cascade", "displacement", "SameStep")],
+    ("model", "task"), [("station", "rotation"), ("cascade", "displacement"), *LITERATURE]
 )
-def test_parked_stations_disturb_nobody(model, task, mode):
+def test_parked_stations_disturb_nobody(model, task):
+    mode = "NextStep" if task == "rotation" else "SameStep"
     weak = load_model(model).replace({"limits.tension_n": 5.0})
     made = {"noise": False, "pressure_kpa": 300.0}
     envs = PMAVectorEnv(19, task, model=weak, autoreset_mode=mode, **made)
