@@ -102,7 +102,8 @@ def test_wrapped_environments_are_copied(same):
     for _ in range(20):
         env.step(env.action_space.sample())
     env.render()
-    other = copy.deepcopy(env)
+    other = COPIERS["pickle"](env)
+    assert other.spec == env.spec
     actions = [other.action_space.sample() for _ in range(15)]
     # Spaces go on with the same draws too, each with its own.
     assert same([env.action_space.sample() for _ in range(15)], actions)

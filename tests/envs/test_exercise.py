@@ -134,6 +134,22 @@ def test_nobody_pushes_the_leg_beyond_straight():
     assert max(angles) < 98.0
 
 
+def test_the_weak_do_not_come_up():
+    env = PMAEnv("isokinetic_exercise", operator=EXACT._replace(strength=60.0))
+    env.reset(seed=0, options={"pressure_kpa": 450})
+    assert held(env, 9.0)[-1]["rotation_deg"] < 85.0
+
+
+def test_who_tires_gives_less_where_it_is_all_that_he_can():
+    last = []
+    for rate in (0.0, 2.0 / 60.0):
+        someone = EXACT._replace(strength=80.0, fatigue=rate)
+        env = PMAEnv("isokinetic_exercise", operator=someone, pressure_kpa=450)
+        env.reset(seed=0)
+        last.append(held(env, 10.0)[-1]["rotation_deg"])
+    assert last[1] < last[0] - 0.3
+
+
 def test_a_heavier_leg_swings_more_slowly():
     # A torsional pendulum: the period goes with the root of the inertia.
     def crossings(inertia: float) -> float:

@@ -6,7 +6,7 @@ import pytest
 from gymnasium.envs.registration import EnvSpec
 from gymnasium.wrappers import RecordEpisodeStatistics, TimeAwareObservation, TimeLimit
 
-from pma_gym.envs import ENVIRONMENTS, PMAEnv, PMAVectorEnv
+from pma_gym.envs import ENVIRONMENTS, PMAEnv
 from pma_gym.tasks import named_task
 
 DISPLACEMENT = "pma_gym/IsokineticDisplacement-v0"
@@ -140,30 +140,6 @@ def test_what_an_episode_did_not_reach_counts_until_its_truncation(fragile, foll
 
 
 # -- batches ---------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("mode", ["NextStep", "SameStep", "Disabled"])
-def test_batches_truncate_after_their_number_of_steps(mode):
-    envs = gym.make_vec(DISPLACEMENT, 3, max_episode_steps=np.int64(4), autoreset_mode=mode, **MADE)
-    assert isinstance(envs, PMAVectorEnv) and envs.spec.max_episode_steps == 4
-    single = PMAEnv("displacement", max_episode_steps=4, **MADE)
-    assert run(single)[0] == 4
-    expected = single.episode_summary()
-    envs.reset(seed=1)
-    actions = np.full((3, 1), -1.0)
-    ends = []
-    for step in range(1, 13):
-        *_, terminated, truncated, info = envs.step(actions)
-        assert not terminated.any() and truncated.all() == truncated.any()
-        if truncated.any():
-            ends.append(step)
-            final = info["final_info"] if mode == "SameStep" else info
-            if len(ends) == 1:
-                assert final["rmse_mm"][0] == expected["rmse_mm"]
-            assert final["_rmse_mm"].all() and final["limit_code"].tolist() == [0] * 3
-        if truncated.any() and mode == "Disabled":
-            envs.reset(options={"reset_mask": truncated})
-    assert ends == ([4, 9] if mode == "NextStep" else [4, 8, 12])
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,5 @@
 """`np_random_seed` says how to begin again; a generator set as `np_random` gives a seed."""
 
-import gymnasium as gym
 import numpy as np
 import pytest
 
@@ -55,14 +54,6 @@ def test_a_generator_that_is_set_gives_the_seed_of_the_next_reset(make, same):
         env.np_random = 5
 
 
-def test_wrappers_say_the_same():
-    env = gym.wrappers.TimeLimit(gym.make("pma_gym/IsokineticDisplacement-v0"), 10)
-    with pytest.raises(TypeError, match="np_random must be a numpy.random.Generator"):
-        env.np_random = 5
-    env.reset(seed=5)
-    assert env.np_random_seed == 5
-
-
 def test_seeds_of_batches():
     envs = PMAVectorEnv(3, model="serres2008", randomisation="varied")
     seed = envs.np_random_seed
@@ -89,11 +80,3 @@ def test_some_seeds_given_and_the_others_drawn_begin_again():
     assert isinstance(seeds, tuple) and seeds[0] == 4 and seeds[1] != seeds[2]
     again, _ = PMAVectorEnv(3, model="serres2008").reset(seed=seeds)
     np.testing.assert_array_equal(again, seen)
-
-
-def test_the_action_space_is_seeded_by_itself(single):
-    env, other = single({}), single({})
-    env.reset(seed=1)
-    other.reset(seed=2)
-    assert env.action_space.seed(8) == other.action_space.seed(8)
-    np.testing.assert_array_equal(env.action_space.sample(), other.action_space.sample())

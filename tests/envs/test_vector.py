@@ -4,12 +4,18 @@ import numpy as np
 import pytest
 
 from pma_gym.envs import PMAVectorEnv
-from pma_gym.plant.model import load_model
+from pma_gym.plant.model import load_model, shipped_models
 from pma_gym.plant.sensors import noise_levels
 from pma_gym.tasks import EXERCISES, multisine
 
 EPISODE = 51
 """Steps of a displacement at 10 Hz."""
+
+LITERATURE = [
+    pytest.param(name, "rotation", marks=pytest.mark.campaign)
+    for name in sorted({*shipped_models()} - {"station", "cascade"})
+]
+"""The other models, whose laws are tested one by one in `tests/codegen`."""
 
 SEVERAL = {
     "randomisation": "varied", "action_delay_s": 0.2, "observation_delay_s": 0.3, "history": 2,
@@ -68,6 +74,9 @@ def test_a_batch_is_gymnasiums_own_loop(twins, fragile, case):
     for _ in range(3 * EPISODE):
         both.step()
     assert both.ends.sum() > 2 * count
+    # Episodes that go on are begun anew as well.
+    both.reset()
+    both.step()
 
 
 @pytest.mark.parametrize(("threads", "options"), [(2, {}), (5, {"randomisation": "varied"})])
@@ -104,22 +113,6 @@ def test_the_lanes_of_any_processor_give_the_same_bits(monkeypatch, twins, fragi
     for _ in range(2 * EPISODE):
         both.step()
     assert both.ends[0].sum() > 18
-
-
-@pytest.mark.parametrize(("task", "mode"), [("displacement", "NextStep"), ("rotation", "SameStep")])
-def test_episodes_follow_each_other_as_gymnasium_has_it(twins, fragile, mode, task):
-    both = twins(5, task, autoreset_mode=mode, model=fragile, pressure_kpa="random")
-    both.reset(seed=[3, 1, 4, 1, 5])
-    # Gently in turn, so that some episodes reach their end.
-    for k in range(12 * EPISODE):
-        both.step(-1.0, 1.0 if k % 250 < 60 else -0.9)
-    assert both.ends[0].sum() > 3 and both.ends[1].sum() > 3
-    # Episodes that go on are begun anew as well.
-    both.reset()
-    both.step()
-    both.reset(seed=9, options={"pressure_kpa": 444.0})
-    assert both.batch.station_info()["pressure_kpa"] == pytest.approx([444.0] * 5)
-    both.step()
 
 
 def test_pressures_of_some_episodes_are_for_those_alone():
@@ -166,7 +159,9 @@ def test_each_environment_has_its_own_pressures(twins):
     assert set(listed) <= {300.0, 400.0} and len(set(drawn)) > 2
 
 
-@pytest.mark.parametrize(("model", "task"), [("station", "rotation"), ("cascade", "displacement")])
+@pytest.mark.parametrize(
+    ("model", "task"), [("station", "rotation"), ("cascade", "displacement"), *LITERATURE]
+)
 def test_single_precision_is_near(model, task):
     made = {"model": model, "noise": False, "pressure_kpa": "random"}
     envs = [PMAVectorEnv(17, task, precision=p, **made) for p in ("double", "single")]
@@ -199,10 +194,10 @@ def test_single_precision_gives_the_same_bits_in_any_batch():
 
 
 @pytest.mark.parametrize(
-    ("model", "task", "mode"),
-    [("station", "rotation", "NextStep"), ("cascade", "displacement", "SameStep")],
+    ("model", "task"), [("station", "rotation"), ("cascade", "displacement"), *LITERATURE]
 )
-def test_parked_stations_disturb_nobody(model, task, mode):
+def test_parked_stations_disturb_nobody(model, task):
+    mode = "NextStep" if task == "rotation" else "SameStep"
     weak = load_model(model).replace({"limits.tension_n": 5.0})
     made = {"noise": False, "pressure_kpa": 300.0}
     envs = PMAVectorEnv(19, task, model=weak, autoreset_mode=mode, **made)
