@@ -43,19 +43,19 @@ def trials() -> str:
 
 def targets() -> str:
     """What a run is measured by."""
-    wanted = load_suite().goals
-    simple = wanted.simple_prediction
-    feedback = " and ".join(code(name) for name in wanted.feedback)
+    goals = load_suite().goals
+    simple = goals.simple_prediction
+    feedback = " and ".join(code(name) for name in goals.feedback)
     rows = [
         ["replay, displacement: mean absolute error of slope", f"< {simple['slope']} mm/s"],
         ["replay, displacement: mean absolute error of intercept", f"< {simple['intercept']} mm"],
         ["replay, displacement: mean absolute error of RMSE", f"< {simple['rmse']} mm"],
-        [f"{feedback}: displacement, largest RMSE", f"≤ {wanted.displacement_rmse_mm:g} mm"],
-        [f"{feedback}: rotation I and II", f"≤ {wanted.rotation_moving_rmse_deg:g} deg"],
+        [f"{feedback}: displacement, largest RMSE", f"≤ {goals.displacement_rmse_mm:g} mm"],
+        [f"{feedback}: rotation I and II", f"≤ {goals.rotation_moving_rmse_deg:g} deg"],
         [
             f"{feedback}: rotation III, above the achievable bound",
-            f"≤ {wanted.return_above_bound_deg:g} deg",
+            f"≤ {goals.return_above_bound_deg:g} deg",
         ],
-        ["whole job", f"< {wanted.wall_time_s:g} s"],
+        ["whole job", f"< {goals.wall_time_s:g} s"],
     ]
     return table(["What", "Target"], rows)
