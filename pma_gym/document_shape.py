@@ -129,9 +129,9 @@ def _rule(shape: Any) -> str:  # noqa: ANN401
     return f"{kind} in {shape.low:g} to {shape.high:g}"
 
 
-def _check(good: bool, place: str, rule: str, came: object) -> None:
+def _check(good: bool, place: str, rule: str, value: object) -> None:
     if not good:
-        raise ShapeError(f"{place or 'it'} must be {rule}, got {reprlib.repr(came)}")
+        raise ShapeError(f"{place or 'it'} must be {rule}, got {reprlib.repr(value)}")
 
 
 def shape_of(hint: Any, finite: bool = True) -> Any:  # noqa: ANN401 - a type hint in, a shape out

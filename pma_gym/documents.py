@@ -312,10 +312,10 @@ def _checked(document: Any, file: str, own: bool = False, finite: bool = True) -
     return checked(document, "")
 
 
-def _beyond(file: str, place: str, came: str) -> DocumentError:
+def _beyond(file: str, place: str, value: str) -> DocumentError:
     shown = printable(place[:_SHOWN]) or "the value"
     return DocumentError(
-        f"{file}: {shown} must be a finite number, below 1e308 in size, got {came}; correct it"
+        f"{file}: {shown} must be a finite number, below 1e308 in size, got {value}; correct it"
     )
 
 

@@ -117,6 +117,19 @@ WORDS = {
 }
 """Identifiers that are not used, exactly as they would stand, and what stands in their place."""
 
+VAGUE = {
+    "given": "initial_model, arguments, requested, table",
+    "wanted": "target, prescription, expected, planned",
+    "came": "actual, value",
+    "begun": "start, started",
+}
+"""Identifiers that do not say what they name, and are gone from all folders but `WITH_VAGUE`."""
+
+WITH_VAGUE = (
+    *("benchmarks/hidden_effects/baselines", "benchmarks/training", "pma_gym/discovery"),
+    *("pma_gym/engine", "pma_gym/envs", "pma_gym/plant/exercise_device", "pma_gym/sb3", "tests"),
+)
+
 CLEAN = ("benchmarks", "controllers", "docs", "pma_gym", "tests")
 """Folders whose identifiers are held to `WORDS`."""
 
@@ -154,11 +167,11 @@ def identifiers(tree):
             yield (node.asname or node.name).rpartition(".")[2], node.lineno
 
 
-def violations(text):
+def violations(text, words=WORDS):
     """Identifiers of a text that are not used, as messages."""
-    private = {name.lstrip("_"): better for name, better in WORDS.items()}
+    private = {name.lstrip("_"): better for name, better in words.items()}
     if re.search(r"^from typing import .*\bProtocol\b", text, re.MULTILINE):
-        del private["Protocol"]
+        private.pop("Protocol", None)
     return [
         f"line {line}: {name} is not used here; take {private[name.lstrip('_')]}"
         for name, line in identifiers(ast.parse(text))
@@ -175,11 +188,12 @@ def files(names, endings):
 
 @pytest.mark.parametrize("folder", CLEAN)
 def test_identifiers_are_the_fields_words(folder):
-    wrong = [
-        f"{path.relative_to(ROOT)} {message}"
-        for path in files([folder], {".py"})
-        for message in violations(path.read_text(encoding="utf-8"))
-    ]
+    wrong = []
+    for path in files([folder], {".py"}):
+        name = path.relative_to(ROOT).as_posix()
+        words = WORDS if name.startswith(WITH_VAGUE) else WORDS | VAGUE
+        messages = violations(path.read_text(encoding="utf-8"), words)
+        wrong += [f"{name} {message}" for message in messages]
     assert not wrong, "\n".join(wrong)
 
 

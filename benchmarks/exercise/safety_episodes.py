@@ -97,10 +97,10 @@ def planned(episode: int, seed: int, steps: int, period: float) -> Volts:
     return made(generator, steps, period)
 
 
-def pumped(speeds: NDArray[np.float64], otherwise: Volts) -> Volts:
+def pumped(speeds: NDArray[np.float64], at_rest_volts: Volts) -> Volts:
     """Commands of pumping agents at the joints' speeds (rad/s), shape (n,) each (V)."""
     still = np.abs(speeds) < 1.0 * SI_FACTORS["deg"]
-    return np.where(still, otherwise, np.where(speeds > 0.0, 0.0, HIGHEST_V))
+    return np.where(still, at_rest_volts, np.where(speeds > 0.0, 0.0, HIGHEST_V))
 
 
 BLOCK = 250

@@ -21,7 +21,7 @@ from benchmarks.measured.rounds import MOST_ROUNDS, Stages, rounds
 from benchmarks.measured.steps import folds, steps
 from benchmarks.measured.tables import Measured, print_measured
 from benchmarks.measured.trials import measured_dataset
-from benchmarks.measured.triangles import held_against
+from benchmarks.measured.triangles import compare_models
 from pma_gym.data.datasets.dataset import Dataset
 from pma_gym.data.files.trial_files import encode_trial
 from pma_gym.plant.model import load_model
@@ -132,7 +132,7 @@ def _computed(stages: Stages, jobs: int, seed: int, most: int, tell: Tell) -> Me
         smooth_errors(*judged),
         not_detectable,
         proposals,
-        held_against(models, initial_model),
+        compare_models(models, initial_model),
         0.0,
         _settings(seed, stages),
     )

@@ -5,14 +5,14 @@ import numpy as np
 from benchmarks.measured.steps import PHASE_NAMES
 from benchmarks.measured.tables import (
     COLUMNS,
-    HELD_HEADER,
+    COMPARISON_HEADER,
     NOT_DETECTABLE_HEADER,
     REPLAY_HEADER,
     TARGET_MM,
     Measured,
+    comparison_rows,
     error_rows,
     experiment_text,
-    held_rows,
     not_detectable_rows,
     readable,
     replay_rows,
@@ -88,7 +88,9 @@ def _blocks(result: Measured) -> list[Block]:
             "The curves are pictures; their text gives the error of the dissertation's own model "
             "in mm and in percent of the contraction, taken here for the stroke."
         ),
-        TextTable("Models and the printed figures", HELD_HEADER, held_rows(result), words=2),
+        TextTable(
+            "Models and the printed figures", COMPARISON_HEADER, comparison_rows(result), words=2
+        ),
     ]
     return blocks
 

@@ -10,7 +10,7 @@ from rich.table import Table
 from benchmarks.measured.detectability import Proposal, Undecidable
 from benchmarks.measured.rounds import Round
 from benchmarks.measured.steps import PHASE_NAMES, Step
-from benchmarks.measured.triangles import Held
+from benchmarks.measured.triangles import ModelComparison
 from pma_gym.terminal import SafeConsole
 
 
@@ -26,7 +26,7 @@ class Measured:
         smooth: rms errors at unseen pressures of a smooth function of the commands, by figure.
         not_detectable: effects that I2 and I3 cannot tell beside the amended model.
         proposals: experiments that would show them.
-        held: models against the validation under triangular pressure.
+        comparisons: models against the validation under triangular pressure.
         seconds: how long this run took (s), without stages kept from an earlier one.
         settings: what was diagnosed, and how many stages which code made.
     """
@@ -38,7 +38,7 @@ class Measured:
     smooth: dict[str, float]
     not_detectable: list[Undecidable]
     proposals: list[Proposal]
-    held: list[Held]
+    comparisons: list[ModelComparison]
     seconds: float
     settings: dict[str, Any]
 
@@ -115,7 +115,7 @@ def replay_rows(result: Measured, phase: str) -> Rows:
     ]
 
 
-def held_rows(result: Measured) -> Rows:
+def comparison_rows(result: Measured) -> Rows:
     """Models against the validation under triangular pressure."""
     return [
         (
@@ -126,11 +126,11 @@ def held_rows(result: Measured) -> Rows:
             f"{each.apart_mm:.2f}",
             f"{each.rmse_mm:.2f}",
         )
-        for each in result.held
+        for each in result.comparisons
     ]
 
 
-HELD_HEADER = (
+COMPARISON_HEADER = (
     *("figure", "model", "stroke (mm)", "measured (mm)"),
     *("from serres2008, rms (mm)", "serres2008 printed, rms (mm)"),
 )
@@ -190,7 +190,12 @@ def print_measured(result: Measured, console: Console) -> None:
     for phase, label in PHASE_NAMES.items():
         title = f"Replay of the printed voltages, {label}: mean absolute error"
         _print(console, title, REPLAY_HEADER, replay_rows(result, phase))
-    _print(console, "Triangular pressure, figures 28 and 29", HELD_HEADER, held_rows(result))
+    _print(
+        console,
+        "Triangular pressure, figures 28 and 29",
+        COMPARISON_HEADER,
+        comparison_rows(result),
+    )
     _print(
         console, "What I2 and I3 cannot tell", NOT_DETECTABLE_HEADER, not_detectable_rows(result)
     )

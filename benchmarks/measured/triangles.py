@@ -73,7 +73,7 @@ TRIANGLES = (
 
 
 @dataclass(frozen=True)
-class Held:
+class ModelComparison:
     """A model held against one validation trial.
 
     Attributes:
@@ -93,7 +93,7 @@ class Held:
     rmse_mm: float
 
 
-def held_against(models: dict[str, Model], own: Model) -> list[Held]:
+def compare_models(models: dict[str, Model], own: Model) -> list[ModelComparison]:
     """Models against both trials.
 
     Args:
@@ -107,7 +107,7 @@ def held_against(models: dict[str, Model], own: Model) -> list[Held]:
             ours = triangle.contraction(model)
             apart = (ours - ours.mean()) - (theirs - theirs.mean())
             rows.append(
-                Held(
+                ModelComparison(
                     triangle.figure,
                     name,
                     1e3 * float(np.ptp(ours)),

@@ -125,9 +125,9 @@ def _check_tensors(document: Mapping[str, Any]) -> None:
         name for name in set(expected) | set(tensors) if tensors.get(name) != expected.get(name)
     )
     for name in wrong[:1]:
-        came = _short(tensors[name]) if name in tensors else "none"
+        actual = _short(tensors[name]) if name in tensors else "none"
         rule = f"the shape {expected[name]}" if name in expected else "no place"
-        raise PolicyError(f"tensors: {name} has {rule} in network.layers, got {came}")
+        raise PolicyError(f"tensors: {name} has {rule} in network.layers, got {actual}")
     digest = document["sha256"]
     hexadecimal = isinstance(digest, str) and len(digest) == 64 and set(digest) <= _HEXADECIMAL
     _check(hexadecimal, "sha256", "64 hexadecimal digits in small letters", digest)
@@ -205,9 +205,9 @@ def _check_training(training: Mapping[str, Any]) -> None:
         _check(good, f"training.{key}", rule, training[key])
 
 
-def _check(good: bool, what: str, rule: str, came: object) -> None:
+def _check(good: bool, what: str, rule: str, value: object) -> None:
     if not good:
-        raise PolicyError(f"{what} must be {rule}, got {_short(came)}")
+        raise PolicyError(f"{what} must be {rule}, got {_short(value)}")
 
 
 _HEXADECIMAL = frozenset("0123456789abcdef")

@@ -36,7 +36,7 @@ for _ in range(max(1, steps // (64 * 64))):
         rollout.append((seen, action, 0.01 * reward.float(), fell, fell | cut, after, begins))
         seen, begins = after, (fell | cut).float()
     # How much better than expected each action was (generalised advantage estimation).
-    s, a, r, fell, over, after, begun = map(torch.stack, zip(*rollout, strict=True))
+    s, a, r, fell, over, after, first_step = map(torch.stack, zip(*rollout, strict=True))
     with torch.no_grad():
         before = Normal(actor(s), log_std.exp()).log_prob(a)
         value = critic(s)[..., 0]
@@ -44,7 +44,7 @@ for _ in range(max(1, steps // (64 * 64))):
         for t in range(62, -1, -1):
             gain[t] += 0.95 * 0.9 * gain[t + 1] * ~over[t]
     # Better actions more probable, within the clip; a step that only begins an episode is none.
-    real = (begun == 0).nonzero()
+    real = (first_step == 0).nonzero()
     for batch in real[torch.randperm(5 * len(real)) % len(real)].split(1024):
         i = batch.unbind(1)
         better = (gain[i] - gain[i].mean()) / gain[i].std()

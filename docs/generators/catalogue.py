@@ -119,7 +119,7 @@ def _parameter(stem: str, quantity: Quantity) -> list[str]:
 def _models_with(effect: str) -> str:
     """Which shipped models have an effect, in few words."""
     known = {name: effect in load_model(name).parameters for name in shipped_models()}
-    having, lacking = ([n for n, has in known.items() if has is wanted] for wanted in (True, False))
+    having, lacking = ([n for n, has in known.items() if has is state] for state in (True, False))
     if not lacking:
         return "all"
     if len(lacking) < len(having):

@@ -32,16 +32,16 @@ def commands(program: str) -> str:
 
 
 def _command(called: str, command: Any) -> str:  # noqa: ANN401 - typer does not export its type
-    given = [p for p in command.params if p.param_type_name == "argument"]
+    arguments = [p for p in command.params if p.param_type_name == "argument"]
     options = [p for p in command.params if p.param_type_name == "option" and not p.hidden]
-    words = [called, *(p.name.upper() for p in given)]
-    words += [f"{p.opts[0]} {p.name.upper()}" for p in options if p.required]
-    words += ["[OPTIONS]"] if any(not p.required for p in options) else []
+    usage = [called, *(p.name.upper() for p in arguments)]
+    usage += [f"{p.opts[0]} {p.name.upper()}" for p in options if p.required]
+    usage += ["[OPTIONS]"] if any(not p.required for p in options) else []
     text = " ".join((command.help or "").split())
     example = (command.epilog or "").removeprefix("Example: ")
-    parts = [f"### {called}", text, f"```text\n{' '.join(words)}\n```"]
+    parts = [f"### {called}", text, f"```text\n{' '.join(usage)}\n```"]
     if command.params:
-        rows = [[_names(p), _default(p), p.help or ""] for p in (*given, *options)]
+        rows = [[_names(p), _default(p), p.help or ""] for p in (*arguments, *options)]
         parts.append(table(["Argument", "Default", "What"], rows))
     if example:
         parts.append(f"```bash\n{example}\n```")

@@ -55,7 +55,9 @@ def differences(base: str, *others: str) -> str:
             continue
         model, from_base = load_model(name), load_model(base)
         without = [code(e) for e in from_base.parameters if e not in model.parameters]
-        same = [e for e, given in from_base.parameters.items() if model.parameters.get(e) == given]
+        same = [
+            e for e, values in from_base.parameters.items() if model.parameters.get(e) == values
+        ]
         words = f"{model.title}. As {code(base)}" + (
             f" without {', '.join(without)}" * bool(without)
         )

@@ -138,8 +138,8 @@ def _checked(process: Callable[..., Any], param: Any, numbers: type | None) -> C
                 kind, example = (
                     ("a whole number", "8") if numbers is int else ("a number", "1.5 or 1e-3")
                 )
-                came = printable(text[:60])
-                refuse(ctx, f"'{came}' is not {kind}; write ASCII digits, such as {example}")
+                shown = printable(text[:60])
+                refuse(ctx, f"'{shown}' is not {kind}; write ASCII digits, such as {example}")
         return process(ctx, value)
 
     return process_value

@@ -63,9 +63,9 @@ def check_time(time: NDArray[np.float64], place: Place) -> None:
     """
     bad = np.flatnonzero(~np.isfinite(time))
     if bad.size:
-        came = "none" if np.isnan(time[bad[0]]) else f"{time[bad[0]]}"
+        value = "none" if np.isnan(time[bad[0]]) else f"{time[bad[0]]}"
         raise TrialError(
-            f"time_s must be a finite number of seconds, {place(int(bad[0]))} has {came}; "
+            f"time_s must be a finite number of seconds, {place(int(bad[0]))} has {value}; "
             "fill it in or remove the row"
         )
     disorder = time_disorder(time, place)

@@ -182,9 +182,9 @@ class EnvState(NamedTuple):
         except (ValueError, TypeError, RecursionError) as error:
             raise StateError(f"a state must be JSON text that to_json() gave: {error}") from None
         if not isinstance(document, dict) or document.get("form") != FORM:
-            came = document.get("form") if isinstance(document, dict) else type(document).__name__
+            form = document.get("form") if isinstance(document, dict) else type(document).__name__
             raise StateError(
-                f"a state's form must be {FORM!r}, got {came!r}; give to_json()'s text"
+                f"a state's form must be {FORM!r}, got {form!r}; give to_json()'s text"
             )
         try:
             return cls._parsed(document)

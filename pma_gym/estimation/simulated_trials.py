@@ -92,13 +92,13 @@ class SimulatedTrials:
         self._buffer, self.attempts = np.empty(0), 0
         self.balanced: NDArray[np.bool_] = np.ones(1, bool)
         self._own: list[tuple[int, Array]] = []
-        self._begun: list[tuple[int, Array]] = []
+        self._start_values: list[tuple[int, Array]] = []
         if self.plant.model.rig.is_free:
             where, speed = initial_states.starts(trials, self._trials)
             paths = dict(
                 zip(self.plant.model.rig.start_paths.values(), (where, speed), strict=True)
             )
-            self._begun = self._indices({path: list(row) for path, row in paths.items()})
+            self._start_values = self._indices({path: list(row) for path, row in paths.items()})
         guesses = memory_start.first_guesses(trials)
         nuisances = [p for p in memory_start.memory_starts(self.plant.model) if p not in free]
         self._memories = self._indices({path: list(guesses) for path in nuisances})
@@ -156,7 +156,7 @@ class SimulatedTrials:
                 for i, space in zip(block, spaces, strict=True)
             ]
             self.attempts += simulate_batches(self.plant.program, batches, self.threads)
-            if self._begun:
+            if self._start_values:
                 spaces = self._met_freely(block, spaces, zeros, vectors, every, tables)
             elif moved:
                 each = zip(block, spaces, strict=True)
@@ -169,9 +169,9 @@ class SimulatedTrials:
 
         A position whose zero is free begins anywhere.
         """
-        if self._begun:
+        if self._start_values:
             free = self.plant.model.rig.signals[0].has_free_zero
-            return [[(place, initial_states.MOVE)] for place, _ in self._begun[free:]]
+            return [[(place, initial_states.MOVE)] for place, _ in self._start_values[free:]]
         return [[(place, memory_start.MOVE) for place, _ in self._memories]] * bool(self._memories)
 
     def _met(self, number: int, space: Array, zeros: Array, vectors: Array) -> Array:
@@ -261,7 +261,9 @@ class SimulatedTrials:
         tried = len(space) - further
         for _ in range(initial_states.RESTARTS):
             before = space[:tried].copy()
-            for (place, _), move in zip(self._begun[-further:], met.moves.tolist(), strict=True):
+            for (place, _), move in zip(
+                self._start_values[-further:], met.moves.tolist(), strict=True
+            ):
                 every[:, place] += initial_states.MOVE * move
             first = np.repeat([logged.first], len(space), axis=0).T
             states, zeros[:] = solver.equilibria_at(self.plant, first[0], first[1], every)
@@ -295,7 +297,7 @@ class SimulatedTrials:
     def _every(self, vectors: Array) -> Array:
         """Parameters of every trial at each of some, shape (trials * tried, numbers)."""
         every = np.tile(vectors, (len(self._trials), 1))
-        for place, values in (*self._begun, *self._memories, *self._own):
+        for place, values in (*self._start_values, *self._memories, *self._own):
             every[:, place] = np.repeat(values, len(vectors))
         return every
 

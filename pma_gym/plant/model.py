@@ -268,10 +268,10 @@ def parse_model(document: Mapping[str, Any], folder: Path | None = None) -> Mode
         ModelError: as `load_model`.
     """
     if document.get("schema") != SCHEMA:
-        came = f"got {_shown(document['schema'])}" if "schema" in document else "there is none"
+        actual = f"got {_shown(document['schema'])}" if "schema" in document else "there is none"
         raise ModelError(
             f"schema must be {SCHEMA}, the only form of model files that this version reads, "
-            f"{came}; write schema = {SCHEMA} as the first line"
+            f"{actual}; write schema = {SCHEMA} as the first line"
         )
     files = document.get(EFFECTS_FROM, [])
     if not isinstance(files, list) or not all(isinstance(name, str) for name in files):

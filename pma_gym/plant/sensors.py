@@ -243,10 +243,10 @@ def _voltage(
     outside = np.flatnonzero((wished < low - margin) | (wished > high + margin))
     if outside.size:
         column, at = BY_QUANTITY[wish], int(outside[0])
-        least, most, came = (v / SI_FACTORS[column.unit] for v in (low, high, float(wished[at])))
+        least, most, value = (v / SI_FACTORS[column.unit] for v in (low, high, float(wished[at])))
         raise SampleError(
             f"{column.name} must lie in {least:g} to {most:g} {column.unit}, what {voltage}_v of "
-            f"up to {highest:g} V gives; {{place}} has {came:g}; "
+            f"up to {highest:g} V gives; {{place}} has {value:g}; "
             + (_NO_PUSH if SIGNALS[wish].is_force and wished[at] < 0.0 == least else _MENDS[wish]),
             at,
         )

@@ -223,7 +223,7 @@ class Campaign(Protocol):
         """Size r of an effect."""
         ...
 
-    def held(self, effects: Sequence[HiddenEffect]) -> Self:
+    def within_range(self, effects: Sequence[HiddenEffect]) -> Self:
         """The same, so that the rig stays in its range with what it hides."""
         ...
 
@@ -246,7 +246,7 @@ def draw(seed: int, number: int) -> tuple[dict[str, str], dict[str, Any]]:
     rig, kind, simulator = turn_of(number)
     campaign: Campaign = DRAWN[rig](rng, rig, simulator, (seed, number))
     effects = _hidden(rng, kind, campaign)
-    campaign = campaign.held(effects)
+    campaign = campaign.within_range(effects)
     truth = {
         "block": "rigs",
         "kind": kind,

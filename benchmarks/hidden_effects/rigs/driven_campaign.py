@@ -168,7 +168,7 @@ class DrivenCampaign:
         changed = effect_size.change(self.rig, [pilot.motion], [pilot.exact])
         return effect_size.size(changed, self.sensor.rms)
 
-    def held(self, effects: Sequence[HiddenEffect]) -> "DrivenCampaign":
+    def within_range(self, effects: Sequence[HiddenEffect]) -> "DrivenCampaign":
         """The same, with its loop closed where it would lead away without."""
         if self.bandwidth:
             return self

@@ -70,7 +70,7 @@ class ImposedCampaign:
         left = change - table @ np.linalg.lstsq(table, change, rcond=1e-10)[0]
         return float(np.sqrt(np.mean(left**2)) / self.cell.rms)
 
-    def held(self, effects: Sequence[HiddenEffect]) -> "ImposedCampaign":
+    def within_range(self, effects: Sequence[HiddenEffect]) -> "ImposedCampaign":
         """The same: the machine holds its motion against any force."""
         del effects
         return self

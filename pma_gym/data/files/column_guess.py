@@ -60,13 +60,13 @@ def guess_column(name: str, unit: str, values: Array, quantities: Collection[str
         return Guess(BY_NAME[name], 1.0, "its name")
     stem, suffix_unit = _split(name)
     unit = unit_of(unit) or suffix_unit
-    words = re.findall(r"[^\W\d_]+", re.sub(r"(?<=[a-z])(?=[A-Z])", " ", stem).lower())
+    parts = re.findall(r"[^\W\d_]+", re.sub(r"(?<=[a-z])(?=[A-Z])", " ", stem).lower())
     for quantity, known in _WORDS.items():
-        if not any(word in known for word in words) or quantity not in {"time", *quantities}:
+        if not any(word in known for word in parts) or quantity not in {"time", *quantities}:
             continue
-        if unit == "v" and quantity in _RAW and not set(words) & set(_ASKED):
+        if unit == "v" and quantity in _RAW and not set(parts) & set(_ASKED):
             return Guess(BY_NAME[_RAW[quantity]], 1.0, "its name, in volts")
-        asked = quantity in _COMMANDED and bool(set(words) & set(_ASKED))
+        asked = quantity in _COMMANDED and bool(set(parts) & set(_ASKED))
         column = BY_NAME[(_COMMANDED if asked else _MEASURED)[quantity]]
         factor = FACTORS.get(column.unit, {}).get(unit) if unit else None
         if unit and factor is None:

@@ -41,10 +41,10 @@ def looks_like(name: str) -> tuple[Column, float] | None:
     """
     # Ratios of names take time that grows with their lengths.
     plain = name[:_LONGEST].replace("°", " deg").translate({0xB5: "u", 0x3BC: "u"})
-    words = re.findall(r"[a-z]+", re.sub(r"(?<=[a-z])(?=[A-Z][a-z])", " ", plain).lower())
+    parts = re.findall(r"[a-z]+", re.sub(r"(?<=[a-z])(?=[A-Z][a-z])", " ", plain).lower())
     ends = {unit for factors in FACTORS.values() for unit in factors}
-    unit = words[-1] if len(words) > 1 and words[-1] in ends else ""
-    stem = " ".join(words[:-1] if unit else words)
+    unit = parts[-1] if len(parts) > 1 and parts[-1] in ends else ""
+    stem = " ".join(parts[:-1] if unit else parts)
     close = [
         (difflib.SequenceMatcher(None, stem, known).ratio(), column)
         for column, stems in _STEMS.items()

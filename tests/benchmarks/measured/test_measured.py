@@ -26,7 +26,7 @@ from benchmarks.measured.rounds import Round, Stages, rounds
 from benchmarks.measured.steps import Step
 from benchmarks.measured.tables import COLUMNS, print_measured
 from benchmarks.measured.trials import measured_dataset
-from benchmarks.measured.triangles import TRIANGLES, Held
+from benchmarks.measured.triangles import TRIANGLES, ModelComparison
 from pma_gym.data.datasets.dataset import read_dataset
 from pma_gym.data.files.trial_files import TrialWarning
 from pma_gym.data.serres2008 import load_table
@@ -265,7 +265,7 @@ def test_the_page_and_the_tables_say_what_was_found():
         smooth={key: 0.7 for key, _ in COLUMNS},
         not_detectable=[Undecidable("regulator_delay", "regulator_delay", None, 1)],
         proposals=[Proposal("pressure steps", ("regulator_delay",), 0.2)],
-        held=[Held(28, "station", 17.2, (11.1, 11.8), 1.7, 1.94)],
+        comparisons=[ModelComparison(28, "station", 17.2, (11.1, 11.8), 1.7, 1.94)],
         seconds=1.0,
         settings={"model": "serres2008"},
     )  # fmt: skip
