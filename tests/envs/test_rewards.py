@@ -71,7 +71,9 @@ def test_a_function_gets_floats_and_what_the_info_says():
     assert seen[1][1] == 0.25
 
 
-@pytest.mark.parametrize(("name", "scale"), [("gaussian", 1e-3), ("smooth", np.float64(2.0))])
+@pytest.mark.parametrize(
+    ("name", "scale"), [("gaussian", 1e-3), ("smooth", np.float64(2.0)), (smooth, 0.25)]
+)
 def test_a_scale_multiplies_every_reward(fragile, name, scale):
     made = {**MADE, "model": fragile, "reward": name}
     plain = rewards_of(PMAEnv(**made))
