@@ -1,11 +1,17 @@
-"""Results on disk: each file whole or not at all, in a folder made for it."""
+"""Results on disk: each file whole or not at all, in a folder made for it.
+
+Damaged files of results: their contents are recomputed, with one warning.
+"""
 
 import json
 import re
+import sys
 from collections.abc import Iterator, Mapping
+from functools import cache
 from pathlib import Path
 from typing import Any
 
+from pma_gym.documents import printable
 from pma_gym.files import replace_file
 
 RESULTS = Path("results")
@@ -60,3 +66,36 @@ def toml_document(comment: str, schema: int, tables: Mapping[str, Any]) -> str:
 
 def _key(name: str) -> str:
     return name if re.fullmatch("[A-Za-z0-9_-]+", name) else json.dumps(name)
+
+
+UNREADABLE = (
+    OSError,
+    ValueError,
+    KeyError,
+    TypeError,
+    AttributeError,
+    IndexError,
+    ArithmeticError,
+)
+"""What reading a damaged file, or building something of its content, raises."""
+
+
+def reason(error: BaseException) -> str:
+    """An error in a few words."""
+    message = " ".join(str(error).split())
+    kind = type(error).__name__
+    return message if isinstance(error, OSError | ValueError) else f"{kind}: {message}"
+
+
+@cache
+def say_damaged(path: Path, why: str, then: str = "what it held is computed anew") -> None:
+    """Say once that a file is damaged.
+
+    Args:
+        path: the file or the folder.
+        why: what is wrong with it.
+        then: what happens now.
+    """
+    # A reader names the file itself, and says how a stranger's is put right.
+    why = why.replace(f"{path}: ", "").replace(f"{path} ", "").removesuffix("; write it anew")
+    print(f"warning: {path} is damaged ({printable(why)}); {then}", file=sys.stderr)

@@ -10,9 +10,8 @@ from statistics import fmean
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks.files import RESULTS, write_text
+from benchmarks.files import RESULTS, UNREADABLE, reason, say_damaged, write_text
 from benchmarks.remake_steps import Step, command_line
-from benchmarks.runner.damaged_results import UNREADABLE, reason, say_damaged
 from benchmarks.runner.fingerprint import ROOT
 from benchmarks.suites.frozen import suite_names
 from pma_gym.plant.model import ModelError, load_model

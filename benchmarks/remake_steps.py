@@ -14,7 +14,7 @@ from pathlib import Path
 from benchmarks.runner.fingerprint import ROOT
 from benchmarks.suites.frozen import frozen_suite, suite_names
 from benchmarks.suites.versions import model_digest
-from benchmarks.training.card import train_words
+from benchmarks.training.train_policies import train_words
 from benchmarks.tuning.design import designable
 from controllers.policies.policy_file import load_policy_file
 from controllers.policy import shipped_policies

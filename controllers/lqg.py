@@ -7,9 +7,9 @@ import numpy as np
 from scipy.linalg import solve_discrete_are
 
 from controllers.design.designs import designed
-from controllers.models.cable import free_rotor
 from controllers.models.local_model import FINE, LocalModel, Stroke
 from controllers.models.nominal_motion import nominal_motion
+from controllers.models.operating_range import free_rotor
 from controllers.models.voltage import VOLTAGE_LIMIT
 from controllers.observers.deviation_filter import (
     SHARE,

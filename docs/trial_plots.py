@@ -11,7 +11,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from PIL import Image
 
-from benchmarks.report.plot_style import MEASURED, REFERENCE, styles_of
+from benchmarks.report.plots import MEASURED, REFERENCE, styles_of
 from benchmarks.reproduction.plots import measured_lines
 from benchmarks.runner.phase_score import measured_score, score_trial
 from benchmarks.runner.rollout import make_environment, rollout

@@ -3,7 +3,7 @@
 from pma_gym.data.trial import Trial
 from pma_gym.data.trial_comparison import TrialComparison, compare
 from pma_gym.envs import ENVIRONMENTS, PMAEnv
-from pma_gym.home import give_matplotlib_a_folder
+from pma_gym.files import give_matplotlib_a_folder
 from pma_gym.plant.model import Model, load_model
 from pma_gym.plant.plant import Plant
 

@@ -3,7 +3,7 @@
 import pytest
 
 from pma_gym.limits import LIMITS, LimitError, check_limit, limit
-from pma_gym.numerals import parse_number
+from pma_gym.units import parse_number
 
 
 @pytest.mark.parametrize("name", LIMITS)

@@ -301,7 +301,7 @@ def reproduce(
 
 def _pressures(text: str) -> list[float]:
     from benchmarks.suites.suite import SuiteError
-    from pma_gym.numerals import parse_numbers
+    from pma_gym.units import parse_numbers
 
     numbers = parse_numbers(text)
     if numbers is None:

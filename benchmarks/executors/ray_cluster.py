@@ -11,7 +11,7 @@ from concurrent.futures import FIRST_COMPLETED, Future, wait
 from typing import TYPE_CHECKING, Any
 
 from benchmarks.executors.executor import ExecutorMissing, OnEnd, ProcessDied, run_packed
-from benchmarks.executors.lifetime import end_with
+from benchmarks.executors.local import end_with
 
 if TYPE_CHECKING:
     from ray import ObjectRef

@@ -21,7 +21,6 @@ from benchmarks.exercise.tables import (
     terminal_table,
 )
 from benchmarks.files import write_bytes, write_text
-from pma_gym.numerals import parse_numbers
 from pma_gym.pages.document import (
     Block,
     Callout,
@@ -44,6 +43,7 @@ from pma_gym.plant.exercise_device.device import (
 )
 from pma_gym.plant.exercise_device.knee import BODY_HEIGHT, BODY_MASS, dissertations_knee_peak
 from pma_gym.plant.model import Model, load_model
+from pma_gym.units import parse_numbers
 
 SEARCHED = {"muscles": range(1, 7), "diameter": (10, 20, 40), "length": (150, 200, 250, 300, 400)}
 """Numbers, diameters and lengths (mm) among which the smallest is sought: the diameters are those

@@ -10,11 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pma_gym.documents import read_content
-from pma_gym.numerals import parse_number
 from pma_gym.plant.exercise_device.device import FULL_ANGLE, Device
 from pma_gym.plant.exercise_device.prescription import Held, Schedule, follow, hold, smallest
 from pma_gym.plant.model import Model
-from pma_gym.units import SI_FACTORS
+from pma_gym.units import SI_FACTORS, parse_number
 
 COLUMNS = ("angle_deg", "moment_nm")
 _LARGEST_NM = 10_000.0

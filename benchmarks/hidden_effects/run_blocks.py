@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.executors.executor import Executor, ThisProcess, run_all
-from benchmarks.files import write_text
+from benchmarks.files import UNREADABLE, reason, say_damaged, write_text
 from benchmarks.hidden_effects.evaluation import records, scoring
 from benchmarks.hidden_effects.evaluation.records import CaseRecord, measured_now
 from benchmarks.hidden_effects.evaluation.rounds import Judge, Work, diagnosed
@@ -17,7 +17,6 @@ from benchmarks.hidden_effects.evaluation.targets import RATES, percent, table
 from benchmarks.hidden_effects.evaluation.verdicts import Outcome
 from benchmarks.hidden_effects.generation.blocks import Block
 from benchmarks.hidden_effects.generation.undecidable import BLOCKS
-from benchmarks.runner.damaged_results import UNREADABLE, reason, say_damaged
 from benchmarks.runner.fingerprint import code_digest_with
 from pma_gym.document_shape import Whole, check_shape
 from pma_gym.documents import read_json

@@ -8,8 +8,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar
 
-from benchmarks.files import write_text
-from benchmarks.runner.damaged_results import UNREADABLE, reason, say_damaged
+from benchmarks.files import UNREADABLE, reason, say_damaged, write_text
 from benchmarks.runner.fingerprint import ROOT, code_digest_with
 from pma_gym.data.datasets.dataset import Dataset
 from pma_gym.discovery.diagnosis import Diagnosis

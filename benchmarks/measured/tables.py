@@ -7,10 +7,9 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks.measured.detectability import Proposal, Undecidable
+from benchmarks.measured.held_out import Proposal, Undecidable
 from benchmarks.measured.rounds import Round
-from benchmarks.measured.steps import PHASE_NAMES, Step
-from benchmarks.measured.triangles import ModelComparison
+from benchmarks.measured.steps import PHASE_NAMES, ModelComparison, Step
 from pma_gym.terminal import SafeConsole
 
 

@@ -7,14 +7,15 @@ from collections.abc import Mapping, Sequence
 
 from benchmarks.report.errors import PERCENT, is_bound, task_of
 from benchmarks.report.leaderboard import Leaderboard
-from benchmarks.report.plot_style import Style, styles_of
 from benchmarks.report.plots import (
+    Style,
     distribution_plot,
     loop_plot,
     loop_title,
     margin_table,
     pressure_plot,
     profile_plot,
+    styles_of,
 )
 from benchmarks.report.standings import Standings
 from benchmarks.report.tables import (
@@ -23,11 +24,11 @@ from benchmarks.report.tables import (
     failure_table,
     obstacle_table,
     pair_table,
+    spending,
     spending_table,
     standings_table,
     tasks_table,
 )
-from benchmarks.report.tracking_cost import spending
 from benchmarks.runner.fingerprint import code_digest
 from pma_gym.pages.document import Block, Heading, Paragraph, Picture, TextTable
 from pma_gym.pages.figures import Plot

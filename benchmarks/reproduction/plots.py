@@ -13,7 +13,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
-from benchmarks.report.plot_style import BOUND, MEASURED, REFERENCE, Style, controller_styles
+from benchmarks.report.plots import BOUND, MEASURED, REFERENCE, Style, controller_styles
 from benchmarks.reproduction.replay import QUANTITIES, all_replay_errors, summarise
 from benchmarks.reproduction.results import Results
 from benchmarks.runner.phase_score import PHASES, UNITS, measured_score

@@ -22,19 +22,19 @@ SOURCES = (
     "benchmarks/runner/controller_spec.py",
     "benchmarks/suites/reproduction.py",
     "benchmarks/executors/executor.py",
-    "benchmarks/executors/lifetime.py",
+    "benchmarks/executors/local.py",
     "benchmarks/runner/isolated_controller.py",
     "benchmarks/suites/stations.py",
     "benchmarks/runner/case.py",
     "benchmarks/runner/figures.py",
     "benchmarks/runner/phase_score.py",
-    "benchmarks/suites/recipe.py",
+    "benchmarks/suites/stations.py",
     "benchmarks/suites/frozen.py",
     "benchmarks/suites/suite.py",
 )
 """Files that a figure may depend on. Pages and statistics are made from rows, and are not here."""
 
-PACKAGES = ("numpy", "scipy", "control", "osqp", "llvmlite", "gymnasium")
+VERSIONED = ("numpy", "scipy", "control", "osqp", "llvmlite", "gymnasium")
 """Packages whose versions a figure may depend on."""
 
 
@@ -55,7 +55,7 @@ def key(suite: FrozenSuite, spec: ControllerSpec) -> str:
 def code_digest() -> str:
     """Digest of the repository's code, of the packages' versions and of the user's effects."""
     files = sorted(path for pattern in SOURCES for path in ROOT.glob(pattern))
-    versions = [f"{name} {_version(name)}" for name in PACKAGES]
+    versions = [f"{name} {_version(name)}" for name in VERSIONED]
     parts = [digest_of(files), *versions, *filter(None, [loaded_digest()])]
     return hashlib.sha256("\n".join(parts).encode()).hexdigest()[:16]
 

@@ -26,7 +26,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.executors.executor import ProcessDied, TookTooLong, run_packed, unpacked
-from benchmarks.executors.lifetime import end_with_parent, interrupts_blocked
+from benchmarks.executors.local import end_with_parent, interrupts_blocked
 from benchmarks.runner.controller_spec import ControllerError, ControllerSpec, raised_at
 from benchmarks.runner.rollout import checked_volts
 from controllers.registry import Controller, Reference

@@ -9,8 +9,8 @@ from collections.abc import Callable, Iterator
 from dataclasses import fields
 from pathlib import Path
 
+from benchmarks.files import say_damaged
 from benchmarks.runner.case import Row
-from benchmarks.runner.damaged_results import say_damaged
 from benchmarks.runner.phase_score import PhaseScore
 from benchmarks.suites.suite import SuiteError
 from pma_gym.document_shape import Maybe, Real, ShapeError, Whole, check_shape

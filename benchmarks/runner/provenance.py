@@ -16,9 +16,8 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-from benchmarks.files import write_text
+from benchmarks.files import say_damaged, write_text
 from benchmarks.runner.case import Row
-from benchmarks.runner.damaged_results import say_damaged
 from benchmarks.runner.execution import PendingCases, row_identity
 from benchmarks.runner.fingerprint import code_digest
 from benchmarks.runner.journal import JOURNAL, case_rows

@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.runner.controller_spec import ControllerSpec
-from benchmarks.suites.recipe import Recipe, parse_recipe
 from benchmarks.suites.reproduction import GOAL_FIGURES, Goals, ReproductionSuite
+from benchmarks.suites.stations import Recipe, parse_recipe
 from benchmarks.suites.suite import (
     NOMINAL,
     SUITES,

@@ -8,8 +8,7 @@ from pathlib import Path
 from typing import Any, ClassVar, NamedTuple
 
 from benchmarks.runner.controller_spec import ControllerSpec
-from benchmarks.suites.recipe import Recipe
-from benchmarks.suites.stations import DrawnStation, draw_station
+from benchmarks.suites.stations import DrawnStation, Recipe, draw_station
 from controllers.design import designs
 from pma_gym.plant.model import Model, load_model
 from pma_gym.tasks import named_task

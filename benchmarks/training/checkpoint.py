@@ -12,8 +12,8 @@ import torch
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.save_util import load_from_zip_file, save_to_zip_file
 
-from benchmarks.runner.damaged_results import reason
-from benchmarks.training.validation import Point
+from benchmarks.files import reason
+from benchmarks.training.policy_batch import Point
 from pma_gym.documents import parse_json
 from pma_gym.partials import begin_partial, end_partial
 

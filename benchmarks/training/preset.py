@@ -25,7 +25,7 @@ ALGORITHMS = ("ppo", "sac", "td3", "tqc")
 WRAPPER = "benchmarks.training.policy_env.PolicyEnv"
 """The only wrapper that a preset may name."""
 
-AVERAGE = "benchmarks.training.averaging.WeightAverage"
+AVERAGE = "benchmarks.training.run.WeightAverage"
 """The only callback that a preset may name."""
 
 

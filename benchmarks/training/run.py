@@ -1,10 +1,13 @@
-"""One training: Stable-Baselines3 learns, and its policy is validated ten times on the way."""
+"""One training: Stable-Baselines3 learns, and its policy is validated ten times on the way.
+
+Averages a policy's weights while it is trained: what exploration leaves restless evens out.
+"""
 
 import ast
 import copy
 import time
-from collections.abc import Callable
-from contextlib import closing
+from collections.abc import Callable, Iterator
+from contextlib import closing, contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -20,11 +23,73 @@ from stable_baselines3.common.noise import NormalActionNoise
 from stable_baselines3.common.utils import LinearSchedule
 from stable_baselines3.common.vec_env import VecEnv
 
-from benchmarks.training.averaging import WeightAverage
 from benchmarks.training.checkpoint import load_checkpoint, save_checkpoint
-from benchmarks.training.policy_batch import training_environments, validation_environments
+from benchmarks.training.policy_batch import (
+    Point,
+    training_environments,
+    validate,
+    validation_environments,
+)
 from benchmarks.training.preset import Preset, PresetError
-from benchmarks.training.validation import Point, validate
+
+SPANS = 7.0
+"""How many spans before the training's end the average begins, if the training is so long."""
+
+
+class WeightAverage(BaseCallback):
+    """An exponential moving average of the policy's weights, updated before every rollout.
+
+    Source:
+        B. T. Polyak and A. B. Juditsky 1992, "Acceleration of Stochastic Approximation by
+        Averaging", SIAM Journal on Control and Optimization 30; here with exponential weights.
+
+    Args:
+        share: time constant of the average, as a share of the whole training; 0 for no average.
+
+    Attributes:
+        weights: the average of each of the policy's parameters; none before it begins.
+    """
+
+    def __init__(self, share: float) -> None:
+        super().__init__()
+        self.share = share
+        self.weights: list[torch.Tensor] = []
+
+    def _on_training_start(self) -> None:
+        self._updated = self.model.num_timesteps
+
+    def _on_step(self) -> bool:
+        return True
+
+    def _on_rollout_start(self) -> None:
+        now, total = self.model.num_timesteps, self.model._total_timesteps
+        since, self._updated = now - self._updated, now
+        if now < (1.0 - SPANS * self.share) * total:
+            return
+        own = self._own()
+        if not self.weights:
+            self.weights = [one.clone() for one in own]
+        weight = min(1.0, since / (self.share * total))
+        for mean, one in zip(self.weights, own, strict=True):
+            mean.lerp_(one, weight)
+
+    @contextmanager
+    def applied(self) -> Iterator[None]:
+        """Inside, the model has the averaged weights, if there are any."""
+        own = [one.clone() for one in self._own()]
+        try:
+            self._set(self.weights or own)
+            yield
+        finally:
+            self._set(own)
+
+    def _own(self) -> list[torch.Tensor]:
+        return [parameter.data for parameter in self.model.policy.parameters()]
+
+    def _set(self, weights: list[torch.Tensor]) -> None:
+        for parameter, one in zip(self._own(), weights, strict=True):
+            parameter.copy_(one)
+
 
 CLASSES: dict[str, Any] = {"ppo": PPO, "sac": SAC, "td3": TD3, "tqc": TQC}
 """Class of each algorithm."""

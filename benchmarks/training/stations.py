@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.suites.frozen import frozen_suite
-from benchmarks.suites.recipe import Recipe
-from benchmarks.suites.stations import draw_station
+from benchmarks.suites.stations import Recipe, draw_station
 from benchmarks.suites.suite import SuiteError
 from pma_gym.engine.nominal_rig import nominal_model
 from pma_gym.plant.model import Model, load_model

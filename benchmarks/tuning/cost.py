@@ -8,8 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from benchmarks.tuning.loop_margins import Loop
-from benchmarks.tuning.tuning_task import Job
+from benchmarks.tuning.loop_margins import Job, Loop
 from controllers.design.designs import Gains
 from controllers.feedforward_pid import FeedforwardPID
 from controllers.models.nominal_motion import NominalMotion, nominal_motion

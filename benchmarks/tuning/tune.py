@@ -44,8 +44,7 @@ from benchmarks.executors.choice import local
 from benchmarks.executors.executor import ProcessDied, run_all
 from benchmarks.files import toml_document, write_text
 from benchmarks.tuning.cost import Cost, chosen
-from benchmarks.tuning.loop_margins import lambda_tuning
-from benchmarks.tuning.tuning_task import Job, KeptRows, name_of
+from benchmarks.tuning.loop_margins import Job, KeptRows, lambda_tuning, name_of
 from controllers.design.designs import (
     GAINS_FILE,
     GAINS_SCHEMA,

@@ -28,10 +28,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from controllers.models.cable import Cable, free_rotor
 from controllers.models.local_model import LocalModel
 from controllers.models.nominal_motion import NominalMotion
-from controllers.models.operating_range import sensor_of
+from controllers.models.operating_range import Cable, free_rotor, sensor_of
 from controllers.models.voltage import VOLTAGE_LIMIT, nominal_offset
 from controllers.observers.pressure_filter import PressureFilter
 from pma_gym.envs import Measurement

@@ -12,7 +12,7 @@ import typer
 from typer.core import TyperCommand, TyperGroup
 
 from pma_gym.documents import printable
-from pma_gym.numerals import parse_number
+from pma_gym.units import parse_number
 
 _Option = type(typer.Option())
 

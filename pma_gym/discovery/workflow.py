@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from pma_gym.codegen.threads.sharing import linear_algebra_alone
+from pma_gym.codegen.threads.thread_pool import linear_algebra_alone
 from pma_gym.data.datasets.dataset import Dataset, NamedTrial
 from pma_gym.data.trial import Trial
 from pma_gym.data.trial_columns import TrialError

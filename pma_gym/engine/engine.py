@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pma_gym.codegen.machine import arrays
+from pma_gym.codegen.machine import control
 from pma_gym.codegen.machine.native import builtin
 from pma_gym.codegen.threads.thread_pool import ThreadPool
 from pma_gym.engine.cpu.block_memory import ARGUMENTS
@@ -165,7 +165,7 @@ class Engine(Episodes):
             truncated. With nothing done it gives BAD_ACTION for an action that is not finite, and
             NOT_READ for one that is no array of as many numbers in single or double precision.
         """
-        keys, known = self.state_layout.info, arrays.are_known()
+        keys, known = self.state_layout.info, control.are_known()
         bound = {
             "arguments": self._address,
             "infos": dict.fromkeys(keys) | dict(constants),

@@ -1,14 +1,17 @@
 """Checks of single options: names, numbers and pressures, with errors that say how to fix them.
 
 Option values as plain Python: numbers of NumPy, arrays, ranges and paths survive JSON then.
+
+Signature of a user's reward function, and its check.
 """
 
 import difflib
+import inspect
 import numbers
-from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Set
 from enum import Enum
 from pathlib import PurePath
-from typing import Any, TypeGuard
+from typing import Any, Protocol, TypeGuard
 
 import numpy as np
 
@@ -231,3 +234,47 @@ def unknown_name(what: str, value: object, names: Sequence[str]) -> ValueError:
 def _nearest(name: object, known: Sequence[str]) -> str:
     close = difflib.get_close_matches(str(name).lower(), known, n=1, cutoff=0.5)
     return f" (did you mean {close[0]!r}?)" if close else ""
+
+
+class RewardFunction(Protocol):
+    """Reward of a step: a function of four floats that returns a finite number.
+
+    The arguments are positional, in this order:
+
+    - the true error at the step's end, in percent of the task's range;
+    - the largest change of an entry of the action (-1 to 1) since the step before;
+    - the true position at the step's end, in the unit of the info (mm, deg or N m);
+    - its reference then, in the same unit.
+    """
+
+    def __call__(
+        self, error_percent: float, action_change: float, position: float, reference: float, /
+    ) -> float:
+        """The reward."""
+        ...
+
+
+RULE = (
+    "a function of four numbers (error in percent of the range, change of the action, position, "
+    "reference) that returns a finite number"
+)
+
+
+def check_reward_function(reward: Callable[..., object]) -> None:
+    """Reject a value that cannot be called with four numbers.
+
+    Raises:
+        ValueError: with the rule and the value.
+    """
+    try:
+        signature = inspect.signature(reward)
+    except (TypeError, ValueError):
+        # A builtin may not say what it takes: its first call will.
+        return
+    try:
+        signature.bind(0.0, 0.0, 0.0, 0.0)
+    except TypeError as problem:
+        raise ValueError(
+            f"reward must be a name or {RULE}, got {reward!r}: {problem}; "
+            "def reward(error_percent, action_change, position, reference): ..."
+        ) from None

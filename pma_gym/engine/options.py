@@ -11,18 +11,19 @@ import numpy as np
 from pma_gym.data.trial_checks import check_memory_at_start
 from pma_gym.engine.option_checks import (
     Pressure,
+    RewardFunction,
     check_keywords,
     check_named,
     check_number,
     check_operator,
     check_pressure,
+    check_reward_function,
     check_whole,
     is_real,
     is_whole,
     plain_options,
     unknown_name,
 )
-from pma_gym.engine.reward_function import RewardFunction, check_reward_function
 from pma_gym.pickling import Packed, packed
 from pma_gym.plant.compiled_model import DEFAULT_TOLERANCE, check_tolerance
 from pma_gym.plant.memory_start import begun_at

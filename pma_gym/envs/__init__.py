@@ -2,8 +2,8 @@
 
 import gymnasium as gym
 
+from pma_gym.engine.option_checks import RewardFunction
 from pma_gym.engine.options import Options
-from pma_gym.engine.reward_function import RewardFunction
 from pma_gym.engine.snapshot import StateError
 from pma_gym.envs.pma_env import PMAEnv
 from pma_gym.envs.specs import DefaultSteps, single_wrappers

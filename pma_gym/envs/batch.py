@@ -13,8 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pma_gym.engine.engine import Engine
-from pma_gym.engine.option_checks import Pressure, parse_pressure, parse_pressures, plain_scalar
-from pma_gym.engine.reward_function import RULE
+from pma_gym.engine.option_checks import (
+    RULE,
+    Pressure,
+    parse_pressure,
+    parse_pressures,
+    plain_scalar,
+)
 from pma_gym.plant.model import Model
 from pma_gym.units import SI_FACTORS
 

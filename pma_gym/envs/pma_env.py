@@ -17,12 +17,11 @@ from pma_gym.engine.options import EnvironmentOptions, parse_options, parse_task
 from pma_gym.engine.plain_engine import PlainEngine
 from pma_gym.engine.snapshot import put, take
 from pma_gym.envs.batch import FunctionRewards, parse_seed
-from pma_gym.envs.copies import Copies
 from pma_gym.envs.episode import NOT_BEGUN, Episode
 from pma_gym.envs.rendering.display import Display
 from pma_gym.envs.rendering.history import History
-from pma_gym.envs.rendering.picture_size import USUAL_WIDTH, check_render_width
-from pma_gym.envs.setup import SINGLE, SeededByReset, Setup, setup
+from pma_gym.envs.rendering.scene import USUAL_WIDTH, check_render_width
+from pma_gym.envs.setup import SINGLE, Copies, SeededByReset, Setup, setup
 from pma_gym.envs.specs import completed_spec
 from pma_gym.envs.state import EnvState, check_state, generator_at, generator_state
 from pma_gym.envs.summary import last_info, no_scores, step_info

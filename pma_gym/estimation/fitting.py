@@ -17,7 +17,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pma_gym.codegen.threads.sharing import linear_algebra_alone
+from pma_gym.codegen.threads.thread_pool import linear_algebra_alone
 from pma_gym.data.trial import Trial
 from pma_gym.estimation.least_squares import Fit, Round, inverse, least
 from pma_gym.estimation.residuals import Residuals, Sums

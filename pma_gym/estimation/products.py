@@ -27,7 +27,7 @@ from pma_gym.codegen.machine.control import (
 )
 from pma_gym.codegen.machine.native import compiled
 from pma_gym.codegen.machine.simd import SimdEmitter
-from pma_gym.codegen.threads.sharing import share
+from pma_gym.codegen.threads.thread_pool import share
 
 LANES = 8
 """Rows that are summed beside each other, whatever the processor: the bits depend on it."""

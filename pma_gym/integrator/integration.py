@@ -2,6 +2,8 @@
 
 A lane at the end of its span takes the next piece of work at once, so that lanes with short steps
 delay no other, and the result of a plant depends on no other plant.
+
+A model's equations with the arithmetic of one step, and their values at its start.
 """
 
 from collections.abc import Callable, Sequence
@@ -23,7 +25,8 @@ from pma_gym.codegen.machine.control import (
     variable,
 )
 from pma_gym.codegen.machine.simd import SimdEmitter
-from pma_gym.codegen.trace import split
+from pma_gym.codegen.trace import split, substitute
+from pma_gym.integrator.equations import COMMANDS, Equations
 from pma_gym.integrator.step_attempt import StepAttempt
 
 FUSED = True
@@ -224,3 +227,42 @@ def integrate_lanes(
                     own = lane.job(k)
                     b.store(b.select(goes_on, b.load(own, typ=INTEGER), integer(-1)), own)
     return attempts
+
+
+@dataclass(frozen=True)
+class System:
+    """A model's equations with the arithmetic of one step.
+
+    Attributes:
+        equations: the equations.
+        attempt: one attempt at a step.
+        layout: what a lane works on.
+    """
+
+    equations: Equations
+    attempt: StepAttempt
+    layout: Layout
+
+
+def step_start_values(eq: Equations) -> dict[int, Value]:
+    """Values of the paths and their direction at the start of a step, by id."""
+    here = {memory.after.id: memory.value for memory in eq.rate_independent_states}
+    if eq.travelled is not None and eq.rate_independent_states:
+        here[eq["origin"].id] = eq.travelled[0]
+    return here
+
+
+def rates(eq: Equations) -> list[Value]:
+    """Rates of states, then of memories of the way: their slope along it, times the speed."""
+    from pma_gym.codegen.derivative import derivative
+    from pma_gym.integrator.step_attempt import step_start
+
+    frozen, here = step_start(eq)
+    own = [state.rate for state in eq.states if state.name not in COMMANDS]
+    rates_there = substitute(own, {**frozen, **here})
+    for memory in eq.rate_independent_states:
+        assert eq.travelled is not None
+        (slope,) = derivative(memory.after, [eq.travelled[0]])
+        assert slope is not None
+        rates_there.append(substitute([slope], frozen)[0] * eq.travelled[1])
+    return rates_there

@@ -17,9 +17,8 @@ from pma_gym.codegen.machine.control import (
 from pma_gym.codegen.machine.native import pairs
 from pma_gym.codegen.machine.simd import SimdEmitter
 from pma_gym.integrator.equations import COMMANDS, ZERO
-from pma_gym.integrator.integration import FUSED, Lane, integrate_lanes, memory
+from pma_gym.integrator.integration import FUSED, Lane, System, integrate_lanes, memory
 from pma_gym.integrator.step_attempt import first_size
-from pma_gym.integrator.system import System
 
 JOB = ("rows", "first_order_hold", "time", "motor", "regulator", "table", "start", "out")
 """Entries of a job of `simulate`: counts, then addresses. `start` holds the state vector, the size

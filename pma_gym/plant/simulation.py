@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pma_gym.codegen.threads.sharing import share
+from pma_gym.codegen.threads.thread_pool import share
 from pma_gym.integrator.equations import Interpolation, check_interpolation
 from pma_gym.integrator.trial_kernel import JOB
 from pma_gym.plant.program import FIRST_S, Program

@@ -2,18 +2,18 @@
 
 import pytest
 
-from pma_gym.codegen.machine import arrays
+from pma_gym.codegen.machine import control
 
 
 @pytest.fixture
 def looked_at_anew():
-    arrays.are_known.cache_clear()
+    control.are_known.cache_clear()
     yield
-    arrays.are_known.cache_clear()
+    control.are_known.cache_clear()
 
 
 def test_this_numpy_is_known():
-    assert arrays.are_known()
+    assert control.are_known()
 
 
 @pytest.mark.parametrize(
@@ -28,5 +28,5 @@ def test_this_numpy_is_known():
     ],
 )
 def test_a_member_that_lies_elsewhere_is_noticed(monkeypatch, looked_at_anew, member, other):
-    monkeypatch.setattr(arrays, member, getattr(arrays, other))
-    assert not arrays.are_known()
+    monkeypatch.setattr(control, member, getattr(control, other))
+    assert not control.are_known()

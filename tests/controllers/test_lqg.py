@@ -8,9 +8,9 @@ import pytest
 
 from controllers import LQG, ImprovedFeedforward
 from controllers.lqg import Settings, regulator, steady_gain
-from controllers.models.cable import Cable, free_rotor
 from controllers.models.local_model import LocalModel
 from controllers.models.nominal_motion import nominal_motion
+from controllers.models.operating_range import Cable, free_rotor
 from controllers.observers.deviation_filter import SHARE, SHARE_TIME_S, Unknowns, with_disturbance
 from controllers.observers.pressure_filter import PressureFilter
 from pma_gym.envs import Measurement, PMAEnv, StationInfo

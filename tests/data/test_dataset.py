@@ -8,7 +8,7 @@ import pytest
 
 from pma_gym.data.datasets.dataset import read_dataset
 from pma_gym.data.datasets.lab_sensors import LabSensor
-from pma_gym.data.files.sparse_commands import joined
+from pma_gym.data.files.even_clock import joined
 from pma_gym.data.files.trial_files import TrialWarning, write_trial
 from pma_gym.data.quality.gaps import gaps
 from pma_gym.data.trial import Trial, TrialError

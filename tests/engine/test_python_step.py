@@ -7,7 +7,7 @@ import weakref
 import numpy as np
 import pytest
 
-from pma_gym.codegen.machine import arrays
+from pma_gym.codegen.machine import control
 from pma_gym.engine.cpu.python_step import NOT_READ
 from pma_gym.engine.engine import Engine
 from pma_gym.engine.options import parse_options
@@ -126,7 +126,7 @@ FORMS = {
 @pytest.mark.parametrize("known", [True, False], ids=["read here", "read in Python"])
 @pytest.mark.parametrize("form", FORMS)
 def test_an_action_is_its_numbers_in_whatever_form(monkeypatch, form, known):
-    monkeypatch.setattr(arrays, "are_known", lambda: known)
+    monkeypatch.setattr(control, "are_known", lambda: known)
     env = PMAEnv("displacement", regulator_action=True)
     env.reset(seed=1)
     values = [0.25, 0.25] if form == "one number for all" else [0.25, -0.5]

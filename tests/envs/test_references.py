@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pma_gym.data.trial_schedule import Phase, TrialSchedule
-from pma_gym.engine.cpu import kernel
+from pma_gym.engine import engine_memory
 from pma_gym.envs import PMAEnv
 from pma_gym.metrics import rmse
 from pma_gym.tasks import TASKS, UNSEEN, following, multisine, phase_rmse
@@ -89,8 +89,8 @@ def test_references_of_one_structure_share_their_code(make, monkeypatch):
     assert make("displacement")._engine.kernel.library not in libraries
     narrow = following("narrow", "extension", _ramp, span=10e-3)
     assert make(narrow)._engine.kernel.library not in libraries
-    built: list[kernel.Kernel] = []
-    monkeypatch.setattr(kernel, "Writer", built.append)
+    built: list[engine_memory.Kernel] = []
+    monkeypatch.setattr(engine_memory, "Writer", built.append)
     make(multisine("extension", 99))
     assert built == []
 

@@ -82,7 +82,7 @@ def test_zeros_are_the_same_however_many_readings_are_computed_at_once(monkeypat
         env = make()
         env.reset(seed=3)
         records.append(env._engine.records.copy())
-        monkeypatch.setattr("pma_gym.engine.cpu.kernel.simd_lanes", lambda: 1)
+        monkeypatch.setattr("pma_gym.engine.engine_memory.simd_lanes", lambda: 1)
     np.testing.assert_array_equal(*records)
 
 

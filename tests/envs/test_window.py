@@ -12,7 +12,7 @@ import pytest
 pygame = pytest.importorskip("pygame")
 
 from pma_gym.cli import main  # noqa: E402
-from pma_gym.envs.rendering.window import Window  # noqa: E402
+from pma_gym.envs.rendering.display import Window  # noqa: E402
 
 
 @pytest.fixture

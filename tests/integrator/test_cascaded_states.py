@@ -12,7 +12,7 @@ from pma_gym.codegen.text import evaluate
 from pma_gym.integrator.equations import State
 from pma_gym.integrator.step_attempt import cascaded_states, cascaded_step
 from pma_gym.plant.model import load_model
-from pma_gym.plant.system import system
+from pma_gym.plant.program import system
 
 FREQUENCY = 3.0
 

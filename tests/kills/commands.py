@@ -136,7 +136,7 @@ pma_gym/IsokineticDisplacement-v0:
         form: {kind: increment, authority_v: 0.5}
         options: {control_rate_hz: 10.0, pressure_kpa: 300.0}
   callback:
-    - benchmarks.training.averaging.WeightAverage:
+    - benchmarks.training.run.WeightAverage:
         share: 0.5
   n_envs: 4
   n_timesteps: 4800

@@ -15,9 +15,8 @@ from datetime import date
 from pathlib import Path
 from typing import Any
 
-from benchmarks.files import write_text
+from benchmarks.files import say_damaged, write_text
 from benchmarks.hidden_effects.generation.files import case_name
-from benchmarks.runner.damaged_results import say_damaged
 from benchmarks.runner.fingerprint import ROOT, digest_of
 from benchmarks.runner.provenance import git_state
 from pma_gym.document_shape import check_shape, shape_of

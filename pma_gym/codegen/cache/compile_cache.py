@@ -24,8 +24,7 @@ from pma_gym.codegen.cache.trust import (
     signature,
     user_key,
 )
-from pma_gym.files import replace_file
-from pma_gym.home import home_folder, temporary_folder
+from pma_gym.files import home_folder, replace_file, temporary_folder
 
 _MAGIC = b"pma_gym kernels 2\n"
 

@@ -7,17 +7,20 @@ before they sleep, in compiled code, without Python's lock.
 Every thread has a share of the work, in parts. Who is done with its own takes what others have not
 begun, so that a processor that is slower for a while, or does something else, holds up nobody. The
 function itself may take further parts before it is done with the first (`write_another`).
+
+Threads that share a piece of work whose compiled parts let each other run.
 """
 
 import ctypes
 import os
 import threading
 import weakref
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import cache
 
 import numpy as np
 from llvmlite import ir
+from threadpoolctl import threadpool_limits
 
 from pma_gym.codegen.machine.control import (
     INTEGER,
@@ -319,3 +322,36 @@ def _write_lead(module: ir.Module) -> None:
         its = b.load(atomic(b, share, RESULT), typ=INTEGER)
         b.store(b.or_(b.load(result, typ=INTEGER), its), result)
     b.ret(b.load(result, typ=INTEGER))
+
+
+def share(work: Callable[[int], object], threads: int, kept: object = None) -> None:
+    """Do the parts of a work, the first of them in this thread.
+
+    Args:
+        work: does one part, by its number.
+        threads: how many parts there are.
+        kept: what they write to: it is held until all have ended, should a second Ctrl-C end this
+            call before them.
+    """
+
+    def one(part: int, _: object) -> None:
+        work(part)
+
+    others = [threading.Thread(target=one, args=(k, kept)) for k in range(1, threads)]
+    for other in others:
+        other.start()
+    try:
+        work(0)
+    finally:
+        for other in others:
+            other.join()
+
+
+def linear_algebra_alone() -> threadpool_limits:
+    """A context in which NumPy's and SciPy's linear algebra works in the calling thread alone.
+
+    The matrices of a fit are small: threads of OpenBLAS wait for each other longer than they
+    compute, in the time of the threads that simulate, and how they share a sum depends on the
+    number of cores.
+    """
+    return threadpool_limits(1, user_api="blas")

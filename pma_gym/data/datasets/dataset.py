@@ -10,10 +10,10 @@ from pma_gym.data.datasets.dataset_checks import check_signals, empty_runs
 from pma_gym.data.datasets.dataset_files import PROPOSED, list_files, read_files
 from pma_gym.data.datasets.dataset_toml import DESCRIPTION, Description, read_description
 from pma_gym.data.datasets.lab_sensors import LabSensor, without_ends
-from pma_gym.data.files.sparse_commands import held_commands
+from pma_gym.data.files.even_clock import held_commands
 from pma_gym.data.files.trial_files import TrialWarning, trial_of
 from pma_gym.data.files.trial_hints import strange_columns
-from pma_gym.data.quality.outliers import outliers
+from pma_gym.data.quality.lone_readings import outliers
 from pma_gym.data.readers.table import FileFormat, Table
 from pma_gym.data.trial import Trial
 from pma_gym.data.trial_columns import BY_QUANTITY, ColumnMap, TrialError

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pma_gym.data.files.trial_hints import mapping_line
-from pma_gym.data.quality.outliers import check_possible
+from pma_gym.data.quality.lone_readings import check_possible
 from pma_gym.data.readers.table import Table
 from pma_gym.data.signals import SIGNALS
 from pma_gym.data.trial import Trial

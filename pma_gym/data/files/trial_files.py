@@ -15,8 +15,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from pma_gym.data.files.even_clock import even_clock
-from pma_gym.data.files.sparse_commands import joined
+from pma_gym.data.files.even_clock import even_clock, joined
 from pma_gym.data.files.trial_formats import ENCODERS
 from pma_gym.data.files.trial_hints import looks_like, mapping_line
 from pma_gym.data.files.trial_loading import load_table

@@ -5,7 +5,7 @@ import re
 from collections.abc import Iterable
 
 from pma_gym.data.readers.table import Cells
-from pma_gym.numerals import parse_number
+from pma_gym.units import parse_number
 
 NOT_MEASURED = ("", "nan", "na")
 """Texts, in any case, of a cell in which nothing was measured; they can mean nothing else."""

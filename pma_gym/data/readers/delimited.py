@@ -11,9 +11,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from pma_gym.data.readers import labview
-from pma_gym.data.readers.layout import COMMENTS, Row, arrange
+from pma_gym.data.readers.layout import COMMENTS, Row, arrange, check_widths, split_lines
 from pma_gym.data.readers.table import Request, Table, UnreadableError
-from pma_gym.data.readers.text_lines import check_widths, split_lines
 from pma_gym.data.trial_columns import TrialError
 from pma_gym.limits import check_limit, limit
 

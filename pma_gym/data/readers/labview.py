@@ -12,11 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pma_gym.data.readers.cells import cell_number
-from pma_gym.data.readers.channel_clocks import Channel, on_rows, reference_times
-from pma_gym.data.readers.clock import clock_seconds
-from pma_gym.data.readers.layout import Row, arrange
+from pma_gym.data.readers.clock import Channel, clock_seconds, on_rows, reference_times
+from pma_gym.data.readers.layout import Row, arrange, check_widths, split_lines
 from pma_gym.data.readers.table import Request, Table, UnreadableError
-from pma_gym.data.readers.text_lines import check_widths, split_lines
 from pma_gym.limits import check_limit
 
 END = "***end_of_header***"

@@ -1,8 +1,11 @@
 """Rows of a file to a table: where its header is, what stands around the samples.
 
 Units as laboratories write them: `[mm]`, `(°)`, `kPa`, `Volts`.
+
+Lines of a text, within the limits before there are any.
 """
 
+import io
 import re
 from collections.abc import Mapping, Sequence
 
@@ -11,7 +14,7 @@ from pma_gym.data.readers.cells import bare_text, cell_number, decimal_mark
 from pma_gym.data.readers.clock import looks_like_clock
 from pma_gym.data.readers.table import NoHeaderError, Request, Table, ranges, shown
 from pma_gym.data.trial_columns import Column, TrialError
-from pma_gym.limits import check_limit
+from pma_gym.limits import check_limit, limit
 
 _NAMES = {
     "°": "deg",
@@ -316,3 +319,30 @@ def _span(rows: Sequence[Row]) -> str:
 
 def _are(rows: Sequence[Row]) -> str:
     return "is" if len(rows) == 1 else "are"
+
+
+_QUOTED = 20
+"""Times the most columns that a line with quotes may have separators: some stand in cells."""
+
+
+def split_lines(text: str, file: str) -> list[str]:
+    """Lines of a text, each with its end.
+
+    Raises:
+        LimitError: more than the rows that are read.
+    """
+    check_limit(file, "rows", max(text.count("\n"), text.count("\r")))
+    return list(io.StringIO(text, newline=""))
+
+
+def check_widths(lines: Sequence[str], separator: str, file: str) -> None:
+    """Refuse lines with more cells than are read, before they are taken apart.
+
+    Raises:
+        LimitError: names the file and the limit.
+    """
+    most = limit("columns")
+    for line in lines:
+        count = 1 + line.count(separator)
+        if count > most * (_QUOTED if '"' in line or separator == " " else 1):
+            check_limit(file, "columns", count)

@@ -18,9 +18,8 @@ from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
-from pma_gym.data.readers.reader_child import OUT_OF_MEMORY
+from pma_gym.data.readers.reader_child import OUT_OF_MEMORY, receive_tables, request_fields
 from pma_gym.data.readers.table import Request, Table, damaged
-from pma_gym.data.readers.table_transfer import receive_tables, request_fields
 from pma_gym.data.trial_columns import TrialError
 from pma_gym.limits import PREFIX, LimitError, limit
 

@@ -7,8 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pma_gym.data.files.trial_formats import needed
-from pma_gym.data.readers.channel_clocks import Channel, on_rows, reference_times
-from pma_gym.data.readers.clock import clock_seconds
+from pma_gym.data.readers.clock import Channel, clock_seconds, on_rows, reference_times
 from pma_gym.data.readers.table import PART, Cells, Request, Table
 from pma_gym.data.readers.variables import NUMBERS
 from pma_gym.limits import check_limit

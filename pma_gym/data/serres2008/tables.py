@@ -7,8 +7,7 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
-from pma_gym.data.serres2008.corrections import corrections
-from pma_gym.data.serres2008.printed import FILES, Row, printed_rows
+from pma_gym.data.serres2008.corrections import FILES, Row, corrections, printed_rows
 
 
 @dataclass(frozen=True)

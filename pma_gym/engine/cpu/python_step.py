@@ -2,7 +2,7 @@
 
 from llvmlite import ir
 
-from pma_gym.codegen.machine import arrays
+from pma_gym.codegen.machine import control
 from pma_gym.codegen.machine.control import (
     DOUBLE,
     FLOAT,
@@ -114,15 +114,15 @@ def _read(
     def is_same(pointer: Operand, name: str) -> Operand:
         return b.icmp_unsigned("==", pointer, parts[name])
 
-    _unless(b, b.not_(is_same(member(arrays.TYPE), "array")), unread)
-    dtype = member(arrays.DTYPE)
+    _unless(b, b.not_(is_same(member(control.TYPE), "array")), unread)
+    dtype = member(control.DTYPE)
     is_single = is_same(dtype, "single")
     _unless(b, b.not_(b.or_(is_single, is_same(dtype, "double"))), unread)
-    dimensions = member(arrays.DIMENSIONS, INDEX)
+    dimensions = member(control.DIMENSIONS, INDEX)
     _unless(b, b.icmp_signed("!=", dimensions, ir.Constant(INDEX, 1)), unread)
-    size = b.load(member(arrays.SIZES), typ=INTEGER)
+    size = b.load(member(control.SIZES), typ=INTEGER)
     _unless(b, b.icmp_signed("!=", size, integer(count)), unread)
-    data, stride = member(arrays.DATA), b.load(member(arrays.STRIDES), typ=INTEGER)
+    data, stride = member(control.DATA), b.load(member(control.STRIDES), typ=INTEGER)
     with b.if_else(is_single) as cases:
         for case, element in zip(cases, (FLOAT, DOUBLE), strict=True):
             with case, loop(b, count) as i:

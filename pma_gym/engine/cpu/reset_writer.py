@@ -20,8 +20,7 @@ from pma_gym.codegen.trace import substitute
 from pma_gym.engine.cpu.block_memory import BlockMemory, KernelSpec, narrowed, widened
 from pma_gym.engine.state_layout import DRAW, TARE
 from pma_gym.integrator.integration import FUSED, memory
-from pma_gym.plant.program import FIRST_S, balanced
-from pma_gym.plant.system import memories_at_start, static_force
+from pma_gym.plant.program import FIRST_S, balanced, memories_at_start, static_force
 
 TARE_READINGS = 192
 """Readings at rest whose mean is the sensors' zero: half a second at 384 Hz, as one would do."""

@@ -11,13 +11,12 @@ from pma_gym.codegen.graph import Value
 from pma_gym.codegen.random import normals, philox
 from pma_gym.codegen.trace import substitute
 from pma_gym.engine.actions import HIGHEST_VOLTAGE
-from pma_gym.engine.graph.exercise_step import ExerciseStep, held_volts
+from pma_gym.engine.graph.exercise_step import ExerciseStep, StepInputs, held_volts
 from pma_gym.engine.graph.scoring import position_of
-from pma_gym.engine.graph.step_inputs import StepInputs
 from pma_gym.engine.observation import BOUND, ObservationTable, Prescribed, measured_position
 from pma_gym.engine.state_layout import HAND_PUSH, NOISE, PARTS, TRUTH
+from pma_gym.integrator.integration import step_start_values
 from pma_gym.integrator.step_attempt import first_size
-from pma_gym.integrator.system import step_start_values
 from pma_gym.plant import sensors
 from pma_gym.plant.rigs.station import STATION
 from pma_gym.tasks import REWARDS, broken, missed_reward

@@ -1,18 +1,61 @@
-"""An exercise's part of a control step, as traced arithmetic: operator, safety filter, score."""
+"""An exercise's part of a control step, as traced arithmetic: operator, safety filter, score.
+
+The numbers that a control step reads, as inputs of its graph.
+"""
 
 import math
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 from pma_gym.codegen.generic import to_real, where
-from pma_gym.codegen.graph import Value
+from pma_gym.codegen.graph import CHANGING, HELD, Graph, Value
 from pma_gym.engine.actions import HIGHEST_VOLTAGE
-from pma_gym.engine.graph.step_inputs import StepInputs
 from pma_gym.engine.observation import Prescribed
-from pma_gym.engine.state_layout import FILTER_STATE, NOISE, profile_at_offsets
+from pma_gym.engine.state_layout import FILTER_STATE, NOISE, START, StateLayout, profile_at_offsets
+from pma_gym.integrator.equations import COMMANDS, ZERO, Equations
 from pma_gym.tasks import PACE, MomentProfile, Operator, OperatorState, unsafe
 from pma_gym.tasks.operator import FORESIGHT_S, operator_step, unsteady
 from pma_gym.tasks.safety_filter import MOMENT_FILTER_S, SPEED_FILTER_S, filtered_pressure
 from pma_gym.units import SI_FACTORS
+
+
+@dataclass(frozen=True)
+class StepInputs:
+    """Inputs of a control step by name.
+
+    Attributes:
+        state_layout: places of the numbers.
+        equations: the plant's equations, whose graph all of it is in.
+    """
+
+    state_layout: StateLayout
+    equations: Equations
+
+    @property
+    def graph(self) -> Graph:
+        """The graph of all values."""
+        return self.equations.graph
+
+    def slot(self, name: str) -> Value:
+        """A number of the record, as an input; states and commands are the plant's own."""
+        if name in self.state_layout.states or name in (*COMMANDS, ZERO):
+            return self.equations[name]
+        if name == START or name in self.state_layout.prescribed:
+            return self.graph.input(name, HELD)
+        return self.graph.input(f"record.{name}", CHANGING, self.state_layout.kind(name))
+
+    def action(self, i: int) -> Value:
+        """An entry of the action, as an input."""
+        return self.graph.input(f"action.{i}", CHANGING)
+
+    def reference(self, steps_ahead: int) -> Value:
+        """The reference so many steps after the one that begins (m or rad), as an input."""
+        return self.graph.input(f"reference.{steps_ahead}", CHANGING)
+
+    @property
+    def horizon(self) -> Value:
+        """Control steps after which an episode is truncated, as an input."""
+        return self.graph.input("horizon", CHANGING)
 
 
 def held_volts(volts: Value) -> Value:

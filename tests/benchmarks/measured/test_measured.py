@@ -11,7 +11,6 @@ from typer.testing import CliRunner
 from benchmarks.__main__ import app
 from benchmarks.measured import diagnose_tables
 from benchmarks.measured import rounds as of_rounds
-from benchmarks.measured.detectability import Proposal, Undecidable
 from benchmarks.measured.diagnose_tables import (
     DIAGNOSED_KPA,
     UNSEEN_KPA,
@@ -20,13 +19,20 @@ from benchmarks.measured.diagnose_tables import (
     judged_at,
     write_trials,
 )
-from benchmarks.measured.held_out import limit_errors, repeat_scatter, rms, smooth_errors, worked
+from benchmarks.measured.held_out import (
+    Proposal,
+    Undecidable,
+    limit_errors,
+    repeat_scatter,
+    rms,
+    smooth_errors,
+    worked,
+)
 from benchmarks.measured.pages import measured_page
 from benchmarks.measured.rounds import Round, Stages, rounds
-from benchmarks.measured.steps import Step
+from benchmarks.measured.steps import TRIANGLES, ModelComparison, Step
 from benchmarks.measured.tables import COLUMNS, print_measured
 from benchmarks.measured.trials import measured_dataset
-from benchmarks.measured.triangles import TRIANGLES, ModelComparison
 from pma_gym.data.datasets.dataset import read_dataset
 from pma_gym.data.files.trial_files import TrialWarning
 from pma_gym.data.serres2008 import load_table

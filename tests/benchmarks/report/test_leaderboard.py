@@ -14,10 +14,9 @@ from benchmarks.__main__ import app
 from benchmarks.report.errors import Measure, SuiteRecord, is_bound, measures, pooled_measure
 from benchmarks.report.leaderboard import Leaderboard, read_leaderboard
 from benchmarks.report.page import page_blocks
-from benchmarks.report.plot_style import styles_of
-from benchmarks.report.plots import profile_plot
+from benchmarks.report.plots import profile_plot, styles_of
 from benchmarks.report.publish import NUMBERS, PAGE, PAIRS, TEXT, numbers_csv, pairs_csv, run_report
-from benchmarks.report.tracking_cost import spending
+from benchmarks.report.tables import spending
 from benchmarks.runner.journal import JOURNAL, Journal
 from benchmarks.runner.provenance import RUN
 from benchmarks.suites.suite import Episode, SuiteError, parse_target

@@ -10,7 +10,7 @@ from benchmarks.measured.rounds import Stages
 from benchmarks.runner.journal import JOURNAL, case_rows
 from benchmarks.runner.provenance import RUN, check_run, finished_rows, read_run
 from benchmarks.suites.suite import SuiteError
-from benchmarks.tuning.tuning_task import KeptRows
+from benchmarks.tuning.loop_margins import KeptRows
 from controllers.design.designs import Gains
 from tests.benchmarks.hidden_effects.cheap_diagnosis import by_size
 from tests.fuzz.test_fuzz_documents import ROW

@@ -6,7 +6,7 @@ pytest.importorskip("stable_baselines3")
 
 from torch import nn
 
-from benchmarks.training.averaging import SPANS, WeightAverage
+from benchmarks.training.run import SPANS, WeightAverage
 
 
 class Model:

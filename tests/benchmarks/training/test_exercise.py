@@ -13,12 +13,11 @@ pytest.importorskip("safetensors")
 from rich.console import Console
 
 from benchmarks.training import run
-from benchmarks.training.card import policy_name
+from benchmarks.training.policy_batch import measure_of
 from benchmarks.training.preset import PresetError
 from benchmarks.training.run import Order
 from benchmarks.training.stations import Stations
-from benchmarks.training.train_policies import EXERCISE, ordered, run_train
-from benchmarks.training.validation import measure_of
+from benchmarks.training.train_policies import EXERCISE, ordered, policy_name, run_train
 from controllers.policies.policy_file import load_policy_file
 from controllers.policy import Policy, shipped_policies
 from pma_gym.envs import PMAEnv, PMAVectorEnv

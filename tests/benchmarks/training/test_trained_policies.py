@@ -8,9 +8,9 @@ from typer.testing import CliRunner
 from benchmarks.__main__ import app
 from benchmarks.runner.controller_spec import ControllerError, parse_controllers
 from benchmarks.suites.frozen import frozen_suite
-from benchmarks.training import card
-from benchmarks.training.card import save_policy, train_words
+from benchmarks.training import train_policies
 from benchmarks.training.preset import load_preset
+from benchmarks.training.train_policies import save_policy, train_words
 from controllers.policies.policy_file import load_policy_file, save_policy_file
 from controllers.policy import shipped_policies
 from pma_gym.envs import PMAEnv
@@ -32,7 +32,7 @@ def trained(station):
 
 
 def test_a_policy_is_saved_with_its_card_and_ships_if_asked(station, tmp_path, monkeypatch):
-    monkeypatch.setattr(card, "POLICIES", tmp_path / "shipped")
+    monkeypatch.setattr(train_policies, "POLICIES", tmp_path / "shipped")
     (tmp_path / "shipped").mkdir()
     policy = trained(station)
     path = save_policy(policy, tmp_path)
@@ -49,7 +49,7 @@ def test_what_ships_is_trained_again_by_its_cards_command():
     for path in shipped_policies():
         policy = load_policy_file(path)
         assert f"`python {' '.join(train_words(policy))}`" in path.with_suffix(".md").read_text()
-        assert f"# {policy.name}\n" in card.card(policy)
+        assert f"# {policy.name}\n" in train_policies.card(policy)
         training = policy.training
         preset = load_preset(training["preset"], training["algorithm"], policy.environment["id"])
         adapter = preset.env.adapter

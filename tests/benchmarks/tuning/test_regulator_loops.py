@@ -9,8 +9,7 @@ import pytest
 from benchmarks.report.errors import SuiteRecord
 from benchmarks.report.leaderboard import Leaderboard
 from benchmarks.report.margins import load_step, loops
-from benchmarks.report.plot_style import styles_of
-from benchmarks.report.plots import loop_plot, margin_table
+from benchmarks.report.plots import loop_plot, margin_table, styles_of
 from benchmarks.suites.frozen import frozen_suite
 from controllers import CONTROLLERS
 from controllers.models.operating_range import rest_voltages

@@ -10,9 +10,8 @@ import pytest
 from benchmarks.executors.executor import ProcessDied
 from benchmarks.tuning import tune
 from benchmarks.tuning.cost import UNSTABLE_COST, Cost, scaled_model
-from benchmarks.tuning.loop_margins import Loop, lambda_tuning
+from benchmarks.tuning.loop_margins import Job, KeptRows, Loop, lambda_tuning
 from benchmarks.tuning.tune import TuneError, gains_from, run_tune
-from benchmarks.tuning.tuning_task import Job, KeptRows
 from controllers.design.designs import GAINS_FILE, Gains, scheduled_gains
 from pma_gym.plant.forms.linear import linearize
 from pma_gym.plant.model import load_model
