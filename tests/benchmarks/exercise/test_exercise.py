@@ -9,7 +9,7 @@ from typer.testing import CliRunner
 
 from benchmarks.__main__ import app
 from benchmarks.exercise.choose_device import SEARCHED, Choice, run_exercise
-from benchmarks.exercise.profile import ProfileError, held, read_profile
+from benchmarks.exercise.profile import ProfileError, constant_prescription, read_profile
 from pma_gym.plant.exercise_device.device import (
     FULL_ANGLE,
     Device,
@@ -70,7 +70,7 @@ def test_the_figures_in_the_file_are_the_studys(tmp_path):
     ("moment", "device"), [(17.0, (1, 20, 250)), (24.0, (1, 20, 200)), (150.0, (2, 40, 250))]
 )
 def test_the_smallest_configuration_for_a_moment(tmp_path, moment, device):
-    answer = run_exercise(Choice(), held(moment), tmp_path, Console(quiet=True))
+    answer = run_exercise(Choice(), constant_prescription(moment), tmp_path, Console(quiet=True))
     model = load_model("station")
     assert answer.device == Device(muscles(*device), own_device(model).radius)
     given = resistive_moment(model, answer.device, answer.setting.pressure, FULL_ANGLE).moment
@@ -105,7 +105,7 @@ def test_a_given_size_narrows_the_choice(tmp_path):
     assert {device.muscles.diameter for device in choice.searched(model)} == {0.020}
     assert len(choice.searched(model)) == len(SEARCHED["muscles"]) * len(SEARCHED["length"])
     # Six muscles of 20 mm give 148.57 N m at most.
-    answer = run_exercise(choice, held(145.0), tmp_path, Console(quiet=True))
+    answer = run_exercise(choice, constant_prescription(145.0), tmp_path, Console(quiet=True))
     assert answer.device.muscles.number > 2
 
 

@@ -155,6 +155,7 @@ def test_what_no_trial_excites_is_never_resolved(quiet):
     assert scores["hysteresis"].resolvable is not None
 
 
+@pytest.mark.campaign
 def test_larger_effects_are_resolved_sooner(quiet):
     shared, whitened_of = quiet
     base = baseline(shared)
