@@ -118,19 +118,16 @@ def test_it_tells_more_a_minute_than_most_of_the_library():
 
 
 def test_the_same_seed_proposes_the_same_trial():
+    """It is commands and nothing else; one rival needs no experiment."""
     _, on, rivals, proposal = case("hysteresis")
     again = next_experiment(on, rivals, 0)
     assert proposal is not None and again is not None
     assert (again.excitation, again.expected_odds) == (proposal.excitation, proposal.expected_odds)
+    assert set(again.trial.commands) == {"motor_voltage", "regulator_voltage"}
     for name, volts in again.trial.commands.items():
         np.testing.assert_array_equal(volts, proposal.trial.commands[name])
-
-
-def test_a_proposal_is_commands_and_nothing_else():
-    _, _, _, proposal = case("hysteresis")
-    assert proposal is not None
-    assert set(proposal.trial.commands) == {"motor_voltage", "regulator_voltage"}
     assert not proposal.trial.measurements and not proposal.trial.truth
+    assert next_experiment(on, rivals[:1], 0) is None
 
 
 def test_one_effect_is_asked_about_against_nothing():
@@ -140,11 +137,6 @@ def test_one_effect_is_asked_about_against_nothing():
     proposal = next_experiment(on, [rivals[0], (plain, ())], 0)
     assert proposal is not None and proposal.separates == (rivals[0][0].names[0],)
     assert proposal.expected_odds > 20.0
-
-
-def test_one_rival_needs_no_experiment():
-    _, on, rivals, _ = case("hysteresis")
-    assert next_experiment(on, rivals[:1], 0) is None
 
 
 def test_every_excitation_is_safe_and_as_long_as_a_test_may_be():

@@ -219,8 +219,8 @@ def test_a_small_harmonic_counts_beside_a_line_of_the_same_mains() -> None:
     for part in alone:
         part[CHANNEL] = LEVEL * rng.standard_normal(part.shape[1]) + small
     for rows, lines in ((left, [50.0]), ([p + small for p in left], [50.0, 150.0]), (alone, [])):
-        found = with_lines(_levels(), logged, rows)[CHANNEL].lines
-        assert list(found) == pytest.approx(lines, abs=0.05)
+        fitted = with_lines(_levels(), logged, rows)[CHANNEL].lines
+        assert list(fitted) == pytest.approx(lines, abs=0.05)
 
 
 def test_pieces_of_a_large_slow_misfit_have_no_lines() -> None:

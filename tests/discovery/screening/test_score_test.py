@@ -68,24 +68,21 @@ def noise(base, seed):
     return [generator.standard_normal(part[0].shape) for part in base.columns]
 
 
-def scores_by_name(scores):
+HYSTERETIC = next(each for each in CANDIDATES if each.name == "hysteresis")
+
+
+def probed(shared):
+    """Scores of all candidates in trials, by name."""
+    scores = screen(baseline(shared), CANDIDATES, 0, lambda each: shared.probed(STATION, each))
     return {each.candidate.name: each for each in scores}
 
 
 def test_chance_is_fair(quiet):
     shared, whitened_of = quiet
     base = baseline(shared)
-    least = np.array(
-        [
-            min(
-                each.p_value
-                for each in screen(
-                    with_residual(base, noise(base, seed)), CANDIDATES, seed, whitened_of
-                )
-            )
-            for seed in range(30)
-        ]
-    )
+    drawn = [with_residual(base, noise(base, seed)) for seed in range(30)]
+    scores = [screen(each, CANDIDATES, seed, whitened_of) for seed, each in enumerate(drawn)]
+    least = np.array([min(each.p_value for each in of_one) for of_one in scores])
     # Family-wise: of the least over the whole catalogue. 0.053 is the standard error of the mean.
     assert 0.3 < least.mean() < 0.7
     assert np.sum(least < 0.1) <= 9
@@ -95,11 +92,9 @@ def test_chance_is_fair(quiet):
 @pytest.mark.parametrize("name", HIDDEN)
 def test_what_is_hidden_stands_out(name):
     shared = fit_problem(measured(STATION.with_effects(HIDDEN[name]), 4))
-    scores = screen(baseline(shared), CANDIDATES, 0, lambda s: shared.probed(STATION, s))
-    best = max(scores, key=lambda each: each.gain)
+    best = max(probed(shared).values(), key=lambda each: each.gain)
     assert best.candidate.name == name
-    assert best.gain > 100
-    assert best.change > 0.3
+    assert best.gain > 100 and best.change > 0.3
     assert best.probe >= 0 and best.starts[0][0] == best.probe
 
 
@@ -118,54 +113,31 @@ def test_what_parameters_can_do_is_not_an_effects(quiet):
 def test_what_an_effect_does_is_all_its_own(quiet):
     """A residual that is a probe's change to the letter is explained by factor 1."""
     shared, whitened_of = quiet
-    base = baseline(shared)
-    candidate = next(each for each in CANDIDATES if each.name == "hysteresis")
-    probe = int(np.argmax(candidate.probes[:, 0]))
-    looked = screen(base, [candidate], 0, whitened_of)
-    assert looked[0].gain < 25.0
+    base, probe = baseline(shared), int(np.argmax(HYSTERETIC.probes[:, 0]))
+    assert screen(base, [HYSTERETIC], 0, whitened_of)[0].gain < 25.0
     rows = [-part[1 + probe].astype(float) for part in whitened_of.kept["hysteresis"]]
     scores = screen(with_residual(base, rows), CANDIDATES, 0, whitened_of)
     best = max(scores, key=lambda each: each.gain)
-    assert best.candidate.name == "hysteresis"
-    assert best.probe == probe
+    assert (best.candidate.name, best.probe) == ("hysteresis", probe)
     assert best.factor == pytest.approx(1.0, rel=1e-3)
+    # An effect of one sign does not explain its opposite.
+    assert not HYSTERETIC.signs.any()
+    (against,) = screen(with_residual(base, [-r for r in rows]), [HYSTERETIC], 0, whitened_of)
+    assert against.gain < 0.05 * best.gain
 
 
-def test_an_effect_of_one_sign_does_not_explain_its_opposite(quiet):
-    shared, whitened_of = quiet
-    base = baseline(shared)
-    candidate = next(each for each in CANDIDATES if each.name == "hysteresis")
-    assert not candidate.signs.any()
-    screen(base, [candidate], 0, whitened_of)
-    rows = [part[1].astype(float) for part in whitened_of.kept["hysteresis"]]
-    scores = screen(with_residual(base, rows), [candidate], 0, whitened_of)[0]
-    towards = screen(with_residual(base, [-row for row in rows]), [candidate], 0, whitened_of)[0]
-    assert scores.gain < 0.05 * towards.gain
-
-
-def test_what_no_trial_excites_is_never_resolved(quiet):
+def test_what_no_trial_excites_is_never_resolved():
     """Pressure of a resting regulator says nothing of its delay."""
-    trials = [measured(STATION, 4)[k] for k in (0, 2, 3)]
-    shared = fit_problem(trials)
-    scores = scores_by_name(
-        screen(baseline(shared), CANDIDATES, 0, lambda candidate: shared.probed(STATION, candidate))
-    )
+    scores = probed(fit_problem([measured(STATION, 4)[k] for k in (0, 2, 3)]))
     undetected = scores["regulator_delay"]
-    assert undetected.gain == 0.0 and undetected.p_value == 1.0 and undetected.resolvable is None
+    assert (undetected.gain, undetected.p_value, undetected.resolvable) == (0.0, 1.0, None)
     assert scores["hysteresis"].resolvable is not None
 
 
 @pytest.mark.campaign
 def test_larger_effects_are_resolved_sooner(quiet):
-    shared, whitened_of = quiet
-    base = baseline(shared)
-    plain = scores_by_name(screen(base, CANDIDATES, 0, whitened_of))
-    doubled = replace(shared, trials=[*shared.trials, *shared.trials])
-    twice = scores_by_name(
-        screen(
-            baseline(doubled), CANDIDATES, 0, lambda candidate: doubled.probed(STATION, candidate)
-        )
-    )
+    shared, _ = quiet
+    plain, twice = map(probed, (shared, replace(shared, trials=[*shared.trials] * 2)))
     for name in ("hysteresis", "creep", "regulator_delay"):
         ratio = twice[name].resolvable / plain[name].resolvable
         assert ratio == pytest.approx(1 / np.sqrt(2), rel=0.05)
@@ -173,14 +145,10 @@ def test_larger_effects_are_resolved_sooner(quiet):
 
 def test_fits_begin_where_most_is_explained():
     shared = fit_problem(measured(STATION.with_effects(HYSTERESIS), 4))
-    base = baseline(shared)
-    candidate = next(each for each in CANDIDATES if each.name == "hysteresis")
-    whitened = shared.probed(STATION, candidate)
-    scores = screen(base, [candidate], 0, lambda _: whitened)[0]
-    begun = starting_points(base, whitened, scores)
-    force = candidate.paths.index("hysteresis.force_n")
-    assert begun
-    assert 3.0 < begun[0][force] < 12.0
+    base, whitened = baseline(shared), shared.probed(STATION, HYSTERETIC)
+    (scores,) = screen(base, [HYSTERETIC], 0, lambda _: whitened)
+    (first, *_) = starting_points(base, whitened, scores)
+    assert 3.0 < first[HYSTERETIC.paths.index("hysteresis.force_n")] < 12.0
 
 
 def test_the_seed_alone_draws_chance(quiet):
