@@ -20,7 +20,8 @@ import pma_gym
 from pma_gym.codegen.cache.compile_cache import _store
 from pma_gym.codegen.machine.native import Library
 Library("define double @one() { ret double 1.0 }")
-print(_store().folder.parent)
+store = _store()
+print(store and store.folder.parent)
 """
 
 STEP = """

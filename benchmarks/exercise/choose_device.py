@@ -88,7 +88,9 @@ class Choice:
     def _devices(self, model: Model, common: dict) -> list[Device]:
         own = RADIUS.from_si(own_device(model).radius)
         defaults = {**common, "radius": (own,)}
-        options = [numbers(name, getattr(self, name)) or given for name, given in defaults.items()]
+        options = [
+            numbers(name, getattr(self, name)) or default for name, default in defaults.items()
+        ]
         try:
             return sorted({_device(*each) for each in product(*options)})
         except MusclesError as error:

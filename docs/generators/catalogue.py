@@ -183,8 +183,8 @@ class _Text:
         return _Text(f"{self.within(2)} / {_text(other).within(3)}", 2)
 
 
-def _text(given: Any) -> _Text:  # noqa: ANN401
-    return given if isinstance(given, _Text) else _Text(repr(given))
+def _text(value: Any) -> _Text:  # noqa: ANN401
+    return value if isinstance(value, _Text) else _Text(repr(value))
 
 
 class _Words(Notation):
@@ -236,11 +236,11 @@ class _Words(Notation):
         return f"{name} = {law.__name__}({names})"
 
 
-def _argument(given: Any) -> str:  # noqa: ANN401
+def _argument(argument: Any) -> str:  # noqa: ANN401
     """An argument of a law: a text, or an effect's parameters by the effect's name."""
-    if isinstance(given, _Text):
-        return given.text
-    first = given[0]
+    if isinstance(argument, _Text):
+        return argument.text
+    first = argument[0]
     while isinstance(first, tuple):
         first = first[0]
     return first.text.partition(".")[0]

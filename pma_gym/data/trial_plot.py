@@ -60,8 +60,8 @@ def series_of(trial: HasColumns) -> Series:
     """Commands, then measurements; the true value of what was not measured."""
     outputs = {**trial.truth, **trial.measurements}
     values = {
-        column.name: column.from_si(given[column.quantity])
-        for column, given in _placed(trial.commands, outputs)
+        column.name: column.from_si(group[column.quantity])
+        for column, group in _placed(trial.commands, outputs)
     }
     return Series(trial.time, values)
 
@@ -106,7 +106,7 @@ def _placed(
     """Columns that there are values for, and where these are, in the order of files."""
     kinds = {"command": commands, "measurement": outputs}
     every = [(column, kinds.get(column.kind, {})) for column in COLUMNS]
-    return [(column, given) for column, given in every if column.quantity in given]
+    return [(column, group) for column, group in every if column.quantity in group]
 
 
 def _add_legend(figure: Figure, panels: NDArray[Any], names: Sequence[str]) -> None:

@@ -71,8 +71,8 @@ def test_all_passes_of_the_compiler_give_the_bits_of_few(make, monkeypatch, tmp_
 def test_one_computed_as_a_pair_has_the_bits_of_one_alone(make, monkeypatch):
     rows = []
     for paired in (False, True):
-        for module in ("kernel", "step_writer"):
-            monkeypatch.setattr(f"pma_gym.engine.cpu.{module}.pairs", lambda width, p=paired: p)
+        for module in ("engine_memory", "cpu.step_writer"):
+            monkeypatch.setattr(f"pma_gym.engine.{module}.pairs", lambda width, p=paired: p)
         rows.append(bits(make(preview=1, pressure_kpa=300), 7))
     assert rows[0] == rows[1]
 

@@ -106,7 +106,7 @@ def test_threads_begin_many_episodes_as_one_does(monkeypatch, threads, options):
 
 @pytest.mark.parametrize("width", [4, 16])
 def test_the_lanes_of_any_processor_give_the_same_bits(monkeypatch, twins, fragile, width):
-    monkeypatch.setattr("pma_gym.engine.engine_memory.simd_lanes", lambda single: width)
+    monkeypatch.setattr("pma_gym.engine.engine_memory.simd_lanes", lambda single=False: width)
     both = twins(18, model=fragile, randomisation="varied")
     assert both.batch.engine.width == width
     both.reset(seed=4)
