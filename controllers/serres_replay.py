@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 
-from controllers.design.voltage_table import VoltageTable
 from controllers.registry import Reference
+from controllers.serres_feedforward import VoltageTable
 from pma_gym.data.serres2008 import load_table, pressures
 from pma_gym.envs import StationInfo
 from pma_gym.tasks import TASKS

@@ -17,7 +17,7 @@ from pma_gym.engine.options import Options
 from pma_gym.envs.episode import NOT_BEGUN
 from pma_gym.envs.pma_env import RESET_OPTIONS, PMAEnv
 from pma_gym.envs.rendering.display import Display
-from pma_gym.envs.rendering.history import History, RecordingEngine
+from pma_gym.envs.rendering.scene import History, RecordingEngine
 from pma_gym.envs.summary import step_info
 from pma_gym.plant.plant import Plant
 from pma_gym.tasks import Task, limit_in_words

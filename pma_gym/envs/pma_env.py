@@ -19,8 +19,7 @@ from pma_gym.engine.snapshot import put, take
 from pma_gym.envs.batch import FunctionRewards, parse_seed
 from pma_gym.envs.episode import NOT_BEGUN, Episode
 from pma_gym.envs.rendering.display import Display
-from pma_gym.envs.rendering.history import History
-from pma_gym.envs.rendering.scene import USUAL_WIDTH, check_render_width
+from pma_gym.envs.rendering.scene import USUAL_WIDTH, History, check_render_width
 from pma_gym.envs.setup import SINGLE, Copies, SeededByReset, Setup, setup
 from pma_gym.envs.specs import completed_spec
 from pma_gym.envs.state import EnvState, check_state, generator_at, generator_state

@@ -29,8 +29,7 @@ from pma_gym.engine.state_layout import PARTS
 from pma_gym.envs.batch import BatchActions, FunctionRewards, all_seeds, masked, requested_pressures
 from pma_gym.envs.member import BatchMember
 from pma_gym.envs.rendering.display import Display
-from pma_gym.envs.rendering.history import RecordingEngine
-from pma_gym.envs.rendering.scene import USUAL_WIDTH, check_render_width
+from pma_gym.envs.rendering.scene import USUAL_WIDTH, RecordingEngine, check_render_width
 from pma_gym.envs.setup import SINGLE, Copies, SeededByReset, Setup, own_seeds, setup
 from pma_gym.envs.specs import completed_spec
 from pma_gym.envs.state import EnvState, check_state, generator_at, generator_state

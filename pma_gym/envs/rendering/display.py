@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from pma_gym.envs.rendering.history import History
-from pma_gym.envs.rendering.scene import Scene
+from pma_gym.envs.rendering.scene import History, Scene
 from pma_gym.tasks import Task
 
 if TYPE_CHECKING:

@@ -13,9 +13,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from pma_gym.envs.rendering.history import History
 from pma_gym.envs.rendering.rig_drawing import FAINT, INK, REFERENCE, RigDrawing
-from pma_gym.envs.rendering.scene import USUAL_WIDTH, Scene
+from pma_gym.envs.rendering.scene import USUAL_WIDTH, History, Scene
 from pma_gym.tasks import Task
 from pma_gym.units import SI_FACTORS
 

@@ -1,13 +1,20 @@
 """Interface of an environment for pictures.
 
 Size of pictures.
+
+An engine that records positions and voltages per step, for the pictures of a batch.
 """
 
 from collections.abc import Mapping
 from numbers import Integral
-from typing import Protocol
+from typing import Any, NamedTuple, Protocol
 
+import numpy as np
+from numpy.typing import NDArray
+
+from pma_gym.engine.engine import Engine
 from pma_gym.engine.options import Options
+from pma_gym.units import SI_FACTORS
 
 
 class Scene(Protocol):
@@ -68,3 +75,76 @@ def check_render_width(width: object) -> int:
             f"is half as high), got {width!r}; leave it out for {USUAL_WIDTH}"
         )
     return int(width)  # type: ignore[call-overload]
+
+
+class History(NamedTuple):
+    """Recorded course of an episode.
+
+    Attributes:
+        time: times of the positions since the trial began (s), shape (k,).
+        position: true positions of the controlled quantity (m, rad or N m), shape (k,).
+        voltages: voltage of the task's actuator in every control step (V), shape (steps,).
+    """
+
+    time: NDArray[np.float64]
+    position: NDArray[np.float64]
+    voltages: NDArray[np.float64]
+
+
+class RecordingEngine(Engine):
+    """An `Engine` that records position and voltage of every environment at every step.
+
+    Only a batch that renders uses it; other batches have no extra cost.
+
+    Args:
+        arguments: as `Engine`.
+    """
+
+    def __init__(self, *arguments: Any) -> None:
+        """Compile, and allocate arrays for whole episodes."""
+        super().__init__(*arguments)
+        schedule = self.task.schedule
+        self._shown = f"{schedule.quantity}_{schedule.suffix}", SI_FACTORS[schedule.unit]
+        # A batch may step an episode that has ended once more.
+        steps = self.task.steps(self.options.control_rate_hz) + 2
+        self._every = np.arange(self.count)
+        self._positions = np.full((steps + 1, self.count), np.nan)
+        self._voltages = np.full((steps, self.count), np.nan)
+
+    def step(self) -> int:
+        """Step as `Engine`, and record every environment."""
+        self._follow()
+        ended = super().step()
+        counts = self._counts()
+        self._positions[counts, self._every] = self._present()
+        voltages = self.numbers(f"{self.task.actuator}_voltage")
+        self._voltages[np.maximum(counts - 1, 0), self._every] = voltages
+        return ended
+
+    def _counts(self) -> NDArray[np.int64]:
+        return np.minimum(self.counts(), len(self._voltages))
+
+    def _present(self) -> NDArray[np.float64]:
+        name, factor = self._shown
+        return self.numbers(name) * factor
+
+    def _follow(self) -> None:
+        """Begin the courses anew of environments that are not where they were left.
+
+        They were reset, or a state was put into them.
+        """
+        counts, present = self._counts(), self._present()
+        moved = self._every[self._positions[counts, self._every] != present]
+        if len(moved):
+            self._positions[:, moved], self._voltages[:, moved] = np.nan, np.nan
+            self._positions[counts[moved], moved] = present[moved]
+
+    def history(self, index: int) -> History:
+        """Return the course of an environment's episode at its control steps, NaN where unknown."""
+        self._follow()
+        count = min(self.steps(index), len(self._voltages))
+        return History(
+            np.arange(count + 1.0) * self.options.period,
+            self._positions[: count + 1, index].copy(),
+            self._voltages[:count, index].copy(),
+        )
