@@ -130,7 +130,7 @@ def test_drawn_tasks_are_known_by_their_number():
         assert named_task(name) is None
 
 
-@pytest.mark.parametrize("pressure", [0.0, 1.0])
+@pytest.mark.parametrize("pressure", [0.0, 0.5, 1.0])
 @pytest.mark.parametrize("name", EVERY_TASK)
 def test_the_station_can_follow_everything_but_steps_and_the_way_back_to_zero(name, pressure):
     task = EVERY_TASK[name]

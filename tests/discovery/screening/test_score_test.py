@@ -134,7 +134,6 @@ def test_what_no_trial_excites_is_never_resolved():
     assert scores["hysteresis"].resolvable is not None
 
 
-@pytest.mark.campaign
 def test_larger_effects_are_resolved_sooner(quiet):
     shared, _ = quiet
     plain, twice = map(probed, (shared, replace(shared, trials=[*shared.trials] * 2)))
