@@ -60,6 +60,7 @@ class Engine(Episodes):
         nominal_model: the nominal model that controllers receive.
         nominal: the Plant of the nominal model, with the effects that `disturbances` need.
         models: the Model of every environment's episode.
+        tasks: the Task of every environment's episode.
         pressures: gauge pressure at the start of every episode (Pa), shape (n,).
         horizon: control steps after which an episode is truncated.
         observations: observations of the last step or reset, float32, shape (n, entries).

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from pma_gym.codegen.machine.native import Library, compiled, pairs, simd_lanes
 from pma_gym.engine.cpu.block_memory import ARGUMENTS, BEFORE
 from pma_gym.engine.cpu.step_writer import Writer
-from pma_gym.engine.observation import ObservationTable
-from pma_gym.engine.options import Options
+from pma_gym.engine.observation import ObservationTable, step_references
+from pma_gym.engine.options import Options, draw_task
 from pma_gym.engine.state_layout import StateLayout
 from pma_gym.plant.equilibrium.solver import hangs_by_itself
 from pma_gym.plant.model import Model
@@ -98,6 +98,7 @@ class EngineMemory:
         program = self.nominal.program
         self.kernel = Kernel(program, self.state_layout, self.table, self.width, single)
         self.models = [self.nominal.model] * count
+        self.tasks, self._drawn_by = [task] * count, [(0, 0, -1)] * count
         self.pressures = np.zeros(count)
         self.horizon = options.horizon(task)
         self._allocate()
@@ -115,8 +116,6 @@ class EngineMemory:
         self._tables = np.zeros((rows, self.kernel.table_size, width))
         self._tables[:] = self._table_of(self.nominal.vector)[:, None]
         steps = self.task.steps(options.control_rate_hz)
-        # What has ended may be stepped once more before it is reset.
-        self._references = np.pad(self.table.references, (0, 2), mode="edge")
         self.actions = np.zeros((padded, state_layout.actions))
         self._all_observations = np.zeros((padded, len(self.table.rows)), np.float32)
         self._all_rewards = np.zeros(padded)
@@ -127,8 +126,10 @@ class EngineMemory:
         duration = (steps + 2) * options.period
         samples = int(duration * 384.0) + 8
         self.trace = np.zeros(samples if width == 1 else 1)
-        moves = self.task.schedule.motion is not None
-        self._ideals = self.task.ideals(samples if moves else 1)
+        self._samples = samples if self.task.schedule.motion is not None else 1
+        rows = 1 if options.reference is None else padded
+        self._followed = np.tile(self._row_of(self.task), (rows, 1))
+        self._references, self._ideals = np.split(self._followed, [-self._samples], axis=1)
         self.voltages = np.zeros(steps + 2 if width == 1 else 1)
         self._indices = np.zeros(max(self.count, 1), np.int64)
         self._ranges = np.zeros((max(self.count, 1), 2))
@@ -157,6 +158,7 @@ class EngineMemory:
             "settles": 0,
             "pressures": self._ranges.ctypes.data,
             "horizon": self.horizon,
+            "reference_stride": 0 if options.reference is None else self._followed.shape[1],
         }
         self._arguments[:BEFORE] = [given[name] for name in ARGUMENTS]
         self._count_attempts(1)
@@ -172,6 +174,35 @@ class EngineMemory:
         out = np.empty(self.kernel.table_size)
         self.kernel.table(numbers.ctypes.data, out.ctypes.data)
         return out
+
+    def _row_of(self, task: Task) -> NDArray[np.float64]:
+        """References of a task at the control steps, then its ideal positions at the samples."""
+        # What has ended may be stepped once more before it is reset.
+        steps = np.pad(step_references(task, self.options), (0, 2), mode="edge")
+        return np.concatenate([steps, task.ideals(self._samples)])
+
+    def references(self, index: int) -> NDArray[np.float64]:
+        """References of an environment's episode at the control steps (m or rad), and beyond."""
+        return self._references[index % len(self._references)]
+
+    def _generator(self, index: int, stream: int) -> np.random.Generator:
+        """Random numbers of an environment's episode, as a function of its counters."""
+        seed = int(self._keys[index, 0]) | int(self._keys[index, 1]) << 32
+        counter = [0, 0, stream, int(self._episodes[index])]
+        return np.random.Generator(np.random.Philox(key=seed, counter=counter))
+
+    def _draw_tasks(self, indices: NDArray[np.int64]) -> None:
+        """Draw what episodes follow, unless it is drawn already."""
+        if self.options.reference is None:
+            return
+        for index in indices.tolist():
+            drawn_by = (*self._keys[index].tolist(), int(self._episodes[index]))
+            if drawn_by != self._drawn_by[index]:
+                task = self.task
+                if drawn_by[-1] >= 0:
+                    task = draw_task(task, self.options.reference, self._generator(index, 1))
+                self._followed[index], self.tasks[index] = self._row_of(task), task
+                self._drawn_by[index] = drawn_by
 
     def numbers(self, name: str) -> NDArray[np.float64]:
         """Copy a number of every environment, given by name, shape (n,)."""

@@ -5,6 +5,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from gymnasium import spaces
+from numpy.typing import NDArray
 
 from pma_gym.data.signals import SIGNALS
 from pma_gym.engine.options import Options
@@ -53,8 +54,7 @@ class ObservationTable:
     def __init__(self, task: Task, options: Options) -> None:
         """List the entries, and evaluate the reference at every step once."""
         schedule = task.schedule
-        last = task.steps(options.control_rate_hz) + options.preview
-        self.references = schedule.reference(np.arange(last + 1) * options.period)
+        self.references = step_references(task, options)
         self.rows = _rows(task, options)
         self.space = spaces.Box(-BOUND, BOUND, (len(self.rows),), np.float32)
         self._span = schedule.span
@@ -117,6 +117,12 @@ class ObservationTable:
             *action,
             *(position(delay + k) * (1.0 / self._span) for k in range(1, self._history + 1)),
         ]
+
+
+def step_references(task: Task, options: Options) -> NDArray[np.float64]:
+    """Reference (m or rad) at every control step, and `preview` steps past the end."""
+    last = task.steps(options.control_rate_hz) + options.preview
+    return task.schedule.reference(np.arange(last + 1) * options.period)
 
 
 def measured_position(

@@ -18,8 +18,8 @@ import numpy as np
 from pma_gym.plant.model import Model
 from pma_gym.tasks import OPERATOR_BOUNDS, Operator
 
-WHOLE_BATCH = ("pressure_kpa", "pressures_kpa")
-"""Options that may be a sequence: any iterable of numbers is taken as a list."""
+SEQUENCES = ("pressure_kpa", "pressures_kpa", "reference")
+"""Options that may be a sequence: any iterable is taken as a list."""
 
 
 def plain_options(given: Mapping[str, Any]) -> dict[str, Any]:
@@ -32,7 +32,7 @@ def plain_options(given: Mapping[str, Any]) -> dict[str, Any]:
     {'preview': 2, 'pressure_kpa': [200, 250, 300], 'noise': True}
     """
     return {
-        name: plain_sequence(value) if name in WHOLE_BATCH else plain_scalar(value)
+        name: plain_sequence(value) if name in SEQUENCES else plain_scalar(value)
         for name, value in given.items()
     }
 

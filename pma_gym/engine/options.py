@@ -1,7 +1,8 @@
 """The environments' options and their checks; errors contain the fix."""
 
 import copy
-from collections.abc import Mapping, Sequence
+import re
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any, Self, TypedDict
@@ -40,6 +41,7 @@ from pma_gym.tasks import (
     Task,
     named_task,
 )
+from pma_gym.tasks.unseen import SEEDS, unseen
 
 
 class DefaultSteps(int):
@@ -48,6 +50,9 @@ class DefaultSteps(int):
     # Gymnasium 1.1 takes it as a bound of a Box only if NumPy knows it as an integer.
     dtype = np.dtype(np.int64)
 
+
+Reference = str | Task | Sequence[str | Task]
+"""What episodes follow: "random", a task's name, a Task, or several to draw from."""
 
 OPERATORS = ("random", "typical")
 """Operators by name."""
@@ -83,6 +88,11 @@ class Options:
         randomisation: name of a randomisation in `pma_gym.tasks.RANDOMISATIONS`; or a function of
             the nominal model and a generator that returns a model with the same effects (a
             function cannot be written to JSON).
+        reference: what episodes follow instead of the task's reference, drawn at every reset:
+            "random" (another seed of a multisine, of steps or of speeds), a name of a task or a
+            Task, several of these (a list), or a function of a generator that returns one (which
+            cannot be written to JSON). All differ from the task in their reference alone; None for
+            the task's.
         regulator_action: whether a second action commands the regulator (0-10 V).
         disturbances: name of disturbances in `pma_gym.tasks.DISTURBANCES`.
         operator: operator of an exercise: "random" (drawn at every reset), "typical", or a
@@ -106,6 +116,7 @@ class Options:
     reward: str | RewardFunction = "absolute"
     reward_scale: float = 1.0
     randomisation: str | Randomisation = "none"
+    reference: Reference | Callable[[np.random.Generator], Reference] | None = None
     regulator_action: bool = False
     disturbances: str = "none"
     operator: str | Operator = "random"
@@ -187,6 +198,7 @@ class EnvironmentOptions(TypedDict, total=False):
     reward: str | RewardFunction
     reward_scale: float
     randomisation: str | Randomisation
+    reference: Reference | Callable[[np.random.Generator], Reference] | None
     regulator_action: bool
     disturbances: str
     operator: str | Operator
@@ -255,9 +267,11 @@ def parse_task(given: str | Task, options: Options) -> Task:
         ValueError: an unknown name, with the nearest known one; an option that does not apply to
             the task; or a start pressure outside the model's validity.
     """
-    task = named_task(given) if isinstance(given, str) else given
-    if not isinstance(task, Task):
-        raise unknown_name("task", given, list(EVERY_TASK))
+    task = _known_task("task", given)
+    if options.reference is not None:
+        several = options.reference if isinstance(options.reference, list) else []
+        for one in (options.reference, *several):
+            draw_task(task, one, np.random.default_rng(0))
     if task.actuator == "regulator" and options.regulator_action:
         raise ValueError(
             f"regulator_action gives the motor's tasks a second action; the only action of task "
@@ -266,6 +280,46 @@ def parse_task(given: str | Task, options: Options) -> Task:
     _check_exercise(task, options)
     model = options.nominal
     return _started_within(task, options.pressure_kpa, model) if model.rig.has_muscle else task
+
+
+def _known_task(what: str, given: object, *others: str) -> Task:
+    task = named_task(given) if isinstance(given, str) else given
+    if not isinstance(task, Task):
+        raise unknown_name(what, given, [*others, *EVERY_TASK])
+    return task
+
+
+def draw_task(task: Task, reference: object, generator: np.random.Generator) -> Task:
+    """Draw the task of an episode.
+
+    Args:
+        task: the environment's task.
+        reference: the option `reference`.
+        generator: random numbers of the episode.
+    Raises:
+        ValueError: no task, or one that differs from the environment's in more than its reference.
+    """
+    drawn = reference(generator) if callable(reference) else reference
+    if isinstance(drawn, list) and drawn:
+        drawn = drawn[generator.integers(len(drawn))]
+    if isinstance(drawn, str) and drawn == "random":
+        kind = re.sub("_[0-9]+$", "", task.name)
+        drawn = unseen(f"{kind}_{generator.integers(SEEDS)}")
+        if drawn is None:
+            raise ValueError(
+                'reference "random" draws another seed of a task such as displacement_multisine, '
+                f"rotation_steps or rotation_speeds, and task {task.name} has none: make the "
+                "environment with one of these, or give tasks to draw from"
+            )
+    drawn = _known_task("reference", drawn, "random")
+    own, other = ((t.structure, t.load, t.exercise) for t in (task, drawn))
+    if own != other:
+        raise ValueError(
+            f"reference {drawn.name} differs from task {task.name} in more than its reference "
+            "(quantity, actuator, range, pressures, load, phases or exercise): make the "
+            f"environment with task {drawn.name}, and draw from tasks of its kind"
+        )
+    return drawn
 
 
 def _started_within(task: Task, pressure: Pressure, model: Model) -> Task:

@@ -81,7 +81,7 @@ class PlainEngine(Engine):
         for i, action in enumerate(self.actions[0].tolist()):
             numbers[f"action.{i}"] = action
         for k in range(self.options.preview + 1):
-            numbers[f"reference.{k}"] = float(self._references[count + 1 + k])
+            numbers[f"reference.{k}"] = float(self.references(0)[count + 1 + k])
         # No way has been travelled since; at rest the next one may go either way.
         numbers["origin"] = numbers["contraction"]
         numbers["direction"] = -1.0 if numbers["velocity"] < 0.0 else 1.0
@@ -131,7 +131,8 @@ class PlainEngine(Engine):
         while True:
             known |= {f"record.{name}": float(self.numbers(name)[0]) for name in names}
             sample = int(known["record.sample"])
-            graph = NumberGraph(known | {"ideal": float(self._ideals[sample])} if moves else known)
+            ideal = {"ideal": float(self._ideals[0, sample])} if moves else {}
+            graph = NumberGraph(known | ideal)
             left = graph.input("left", CHANGING)
             one = sampling(graph, left, self.task, self.options.period)
             if not one.due.data:

@@ -101,6 +101,7 @@ def put(engine: EngineMemory, state: Snapshot) -> None:
     # From here on nothing can fail.
     _put_models(engine, state.models)
     _put_numbers(engine, numbers)
+    engine._draw_tasks(np.arange(n))
     engine.pressures[:] = pressures
     engine.observations[:] = observations.reshape(engine.observations.shape)
     engine.rewards[:] = rewards

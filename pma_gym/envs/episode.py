@@ -27,13 +27,12 @@ class Episode:
     `PMAEnv` and the members of a batch inherit it.
 
     Attributes:
-        task: the Task.
+        task: the Task of this episode.
         options: the checked Options.
         table: the ObservationTable.
         nominal_plant: the Plant of the nominal model.
     """
 
-    task: Task
     options: Options
     table: ObservationTable
     nominal_plant: Plant
@@ -43,6 +42,13 @@ class Episode:
     _row: NDArray[np.float64]
     """The engine's record of the environment."""
     _idle: str | None
+    _detached: tuple[Task, Task] | None = None
+    """The task of an episode, and its copy for controllers."""
+
+    @property
+    def task(self) -> Task:
+        """The task of this episode; with `reference` every reset draws it."""
+        return self._engine.tasks[self._index]
 
     def _find_offsets(self) -> None:
         self._offsets = self._engine.state_layout.offsets
@@ -152,7 +158,8 @@ class Episode:
     @property
     def error(self) -> float:
         """True position minus reference (m or rad)."""
-        return self.position - float(self.table.references[self._count])
+        references = self._engine.references(self._index)
+        return self.position - float(references[self._count])
 
     @property
     def extrapolated(self) -> bool:
@@ -195,10 +202,12 @@ class Episode:
         """The reference, called with a time (s): extension, contraction (m) or rotation (rad)."""
         return Reference(self._detached_task.schedule)
 
-    @cached_property
+    @property
     def _detached_task(self) -> Task:
         """What controllers get of the task; made once, so that repeated trials have equal ones."""
-        return detached_task(self.task)
+        if self._detached is None or self._detached[0] is not self.task:
+            self.__dict__["_detached"] = self.task, detached_task(self.task)
+        return self.__dict__["_detached"][1]
 
     def trajectory(self) -> NDArray[np.float64]:
         """True positions (m or rad) at k / 384 s so far, at every control rate, shape (k,)."""
@@ -210,8 +219,8 @@ class Episode:
         Returns:
             `rmse_mm` or `rmse_deg`: over all phases; `rmse_by_phase_mm` or `rmse_by_phase_deg`: of
             each phase so far, by name; `percent_of_range`: the first in percent of 25 mm, 90 deg or
-            the contraction's stroke; `ended_by`: the limit that terminated the episode as text, or
-            "". An exercise also has `exercise_summaries`, and its RMSE is in N m if it prescribes a
-            moment.
+            the contraction's stroke; `task`: name of the episode's task; `ended_by`: the limit that
+            terminated the episode as text, or "". An exercise also has `exercise_summaries`, and
+            its RMSE is in N m if it prescribes a moment.
         """
         return episode_summary(self._engine, self._index)

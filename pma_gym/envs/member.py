@@ -86,7 +86,6 @@ class BatchMember(PMAEnv):
             "spec": batch.spec,
             "metadata": {k: v for k, v in batch.metadata.items() if k != "autoreset_mode"},
             "options": batch.options,
-            "task": batch.task,
             "nominal_plant": engine.nominal,
             "table": batch.table,
             "observation_space": batch.single_observation_space,

@@ -188,7 +188,7 @@ class PMAEnv(Copies, SeededByReset, Episode, gym.Env[NDArray[np.float32], NDArra
         options: keyword arguments, see `Options`.
 
     Attributes:
-        task: the Task.
+        task: the Task of this episode.
         options: the checked Options.
         table: the ObservationTable.
         nominal_plant: the Plant of the nominal model.
@@ -222,12 +222,12 @@ class PMAEnv(Copies, SeededByReset, Episode, gym.Env[NDArray[np.float32], NDArra
         self.render_mode = render_mode
         self.render_width = check_render_width(render_width)
         self.options = parse_options(options, "PMAEnv.__init__()", OWN)
-        self.task = parse_task(task, self.options)
+        parsed = parse_task(task, self.options)
         if not isinstance(compiled, bool):
             raise ValueError(f"compiled must be true or false, got {compiled!r}")
-        self._engine = (Engine if compiled else PlainEngine)(self.task, self.options)
+        self._engine = (Engine if compiled else PlainEngine)(parsed, self.options)
         self.observation_space = self._engine.table.space
-        self._commands = CommandLine(self.options, self.task.actuator)
+        self._commands = CommandLine(self.options, parsed.actuator)
         self.action_space = self._commands.space
         # A film of every step plays in real time.
         self.metadata = self.metadata | {"render_fps": round(self.options.control_rate_hz)}
@@ -237,7 +237,7 @@ class PMAEnv(Copies, SeededByReset, Episode, gym.Env[NDArray[np.float32], NDArra
 
     _ATTACHED = frozenset(
         {"nominal_plant", "table", "plant", "_offsets", "_row", "_measured", "_observed", "_given"}
-        | {"_made", "_datum", "_display", "_advance"}
+        | {"_made", "_datum", "_display", "_advance", "_detached"}
     )
 
     def _attach(self) -> None:

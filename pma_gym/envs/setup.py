@@ -101,7 +101,7 @@ def _task(engine: Engine) -> dict[str, str]:
         said["task.exercise"] = _text(task.exercise)
     digest = hashlib.sha256(repr(task.structure).encode())
     digest.update(engine.table.references.tobytes())
-    digest.update(engine._ideals.tobytes())
+    digest.update(task.ideals(engine._samples).tobytes())
     return said | {"task.reference": f"{task.name} {digest.hexdigest()[:12]}"}
 
 
@@ -252,7 +252,8 @@ class Copies:
         """
         kept = self._kept()
         # These name what is wrong; the spec has it too, without a name.
-        for part in (kept["options"], kept["task"].schedule):
+        engine: Engine = kept.get("engine") or kept["_engine"]
+        for part in (engine.options, engine.task.schedule):
             part.__getstate__()
         spec = kept.get("spec")
         return kept if spec is None else kept | {"spec": packed("spec", spec)}

@@ -67,7 +67,8 @@ def episode_summary(engine: Engine, index: int) -> dict[str, Any]:
     code = score.pop("limit_code")
     started = {name: value for name, value in phases.items() if not math.isnan(value)}
     limit = limit_in_words(engine.models[index], code, task.exercise)
-    return score | {f"rmse_by_phase_{unit}": started, "ended_by": limit}
+    followed = {"task": engine.tasks[index].name, "ended_by": limit}
+    return score | {f"rmse_by_phase_{unit}": started} | followed
 
 
 def _phase_key(phase: str, unit: str) -> str:

@@ -73,7 +73,7 @@ class PMAVectorEnv(
         options: as `PMAEnv`; a `reward` that is a function is called once for each environment.
 
     Attributes:
-        task: the Task.
+        task: the Task; with `reference`, `member(index).task` is that of an episode.
         options: the checked Options.
         table: the ObservationTable.
 

@@ -33,12 +33,13 @@ from pma_gym.plant.program import Program
 ARGUMENTS = (
     *("first", "last", "count", "records", "tables", "table_stride", "references"),
     *("actions", "observations", "rewards", "terminated", "truncated", "trace", "indices"),
-    *("attempts", "voltages", "ideals", "settles", "pressures", "horizon"),
+    *("attempts", "voltages", "ideals", "settles", "pressures", "horizon", "reference_stride"),
 )
 """Entries of a call's arguments: numbers of blocks and environments, then addresses.
 
 With settles other than 0 a beginning draws pressures, from two numbers each, and settles there.
-The horizon is the number of control steps after which episodes are truncated."""
+The horizon is the number of control steps after which episodes are truncated. References and ideal
+positions of an environment lie the stride behind those of the one before; 0 if all share them."""
 
 BEFORE = len(ARGUMENTS)
 """Place, behind them, of the address of those of another part that the same thread took before."""
@@ -84,7 +85,9 @@ class BlockMemory:
 
     def _arguments(self, b: Builder, arguments: Operand) -> dict[str, Operand]:
         by_name = {}
-        numbers = ("first", "last", "count", "table_stride", "settles", "horizon")
+        numbers = (
+            *("first", "last", "count", "table_stride", "settles", "horizon", "reference_stride"),
+        )
         for i, name in enumerate(ARGUMENTS):
             value = b.load(offset(b, arguments, i, INTEGER), typ=INTEGER)
             by_name[name] = value if name in numbers else b.inttoptr(value, POINTER)
@@ -202,17 +205,19 @@ class BlockMemory:
         given: dict[str, Operand],
         records: Operand,
         lane: Operand | int,
+        first: Operand,
         steps_ahead: int,
         later: int,
     ) -> Operand:
-        """References so many steps ahead, for a block or one lane."""
+        """References so many steps ahead, for a block or one lane, by its first environment."""
         references = []
         for k in range(simd.width):
             index = self._row(b, "count", k)
             if simd.width == 1:
                 index = b.add(index, integer(lane))
             steps = self._count(b, offset(b, records, index, self.element))
-            row = b.add(steps, integer(steps_ahead + later))
+            row = b.mul(b.add(first, integer(k)), given["reference_stride"])
+            row = b.add(row, b.add(steps, integer(steps_ahead + later)))
             where = offset(b, given["references"], row, self.element)
             references.append(b.load(where, typ=self.element))
         return self._gathered(b, simd, references)

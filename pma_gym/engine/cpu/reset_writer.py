@@ -205,7 +205,7 @@ class ResetWriter(BlockMemory):
         known = self._known(b, simd, values, records, tables, lane)
         for steps_ahead in range(options.preview + 1):
             known[self.step_graph.reference(steps_ahead).id] = self._references(
-                b, simd, given, records, lane, steps_ahead, 0
+                b, simd, given, records, lane, index, steps_ahead, 0
             )
         emitted = simd.emit(b, values, known)
         self._store(b, simd, emitted, self.begun, records, lane)

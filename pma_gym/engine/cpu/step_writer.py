@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from contextlib import nullcontext
-from typing import Protocol
 
 from llvmlite import ir
 
@@ -34,18 +33,6 @@ from pma_gym.integrator.step_attempt import step_attempt
 
 BAD_ACTION = 4
 """What `check` returns where an action is no finite number: there `step` is not to be called."""
-
-
-class Numbers(Protocol):
-    """Numbers of their own that lanes keep during the integration."""
-
-    def vector(self, what: str) -> Operand:
-        """All lanes' numbers of a name."""
-        ...
-
-    def put_vector(self, what: str, numbers: Operand) -> None:
-        """Write them."""
-        ...
 
 
 class Writer(ResetWriter):
@@ -256,7 +243,7 @@ class Writer(ResetWriter):
         self,
         b: Builder,
         simd: SimdEmitter,
-        lane: Numbers,
+        lane: Lane,
         emitted: dict[int, Operand],
         given: dict[str, Operand],
     ) -> None:
@@ -280,7 +267,7 @@ class Writer(ResetWriter):
                 # Whoever passes no sample looks nothing up.
                 known = simd.emit(b, [one.due], known)
                 leave_if(b.not_(simd.any(b, known[one.due.id])))
-                known[one.ideal.id] = self._ideals(b, simd, given, lane.vector("sample"))
+                known[one.ideal.id] = self._ideals(b, simd, lane, given)
             sampled = simd.emit(b, outputs, known)
             if one.ideal is None:
                 leave_if(b.not_(simd.any(b, sampled[one.due.id])))
@@ -294,12 +281,16 @@ class Writer(ResetWriter):
                 lane.put_vector(f"sum_{phase.name}", sampled[value.id])
 
     def _ideals(
-        self, b: Builder, simd: SimdEmitter, given: dict[str, Operand], samples: Operand
+        self, b: Builder, simd: SimdEmitter, lane: Lane, given: dict[str, Operand]
     ) -> Operand:
-        """Ideal position at the next sample of every lane, from the table."""
-        ideals = []
+        """Ideal position at the next sample of every lane, from the table of its environment."""
+        ideals, samples = [], lane.vector("sample")
         for k in range(simd.width):
+            job = b.load(lane.job(k), typ=INTEGER)
+            # A lane without a job looks up what any environment has.
+            at = b.select(b.icmp_signed("<", job, integer(0)), integer(0), job)
             index = b.fptoui(simd.extract(b, samples, k), INTEGER)
+            index = b.add(index, b.mul(at, given["reference_stride"]))
             where = offset(b, given["ideals"], index, self.element)
             ideals.append(narrowed(b, b.load(where, typ=self.element), simd.element))
         return self._gathered(b, simd, ideals)
@@ -309,6 +300,7 @@ class Writer(ResetWriter):
     def _sense(self, b: Builder, given: dict[str, Operand], block: Operand, ended: Operand) -> None:
         simd = self._lanes(self.width)
         records, tables = self._block(b, given, block)
+        first = b.mul(block, integer(self.width))
         entries = self.step_graph.observation(self.kernel.observed, self.sensed)
         options = self.state_layout.options
         is_over = self.sensed["ended"] > 0.0
@@ -320,11 +312,10 @@ class Writer(ResetWriter):
         known[self.step_graph.horizon.id] = horizon
         for steps_ahead in range(options.preview + 1):
             known[self.step_graph.reference(steps_ahead).id] = self._references(
-                b, simd, given, records, 0, steps_ahead, 1
+                b, simd, given, records, 0, first, steps_ahead, 1
             )
         emitted = simd.emit(b, values, known)
         self._store(b, simd, emitted, self.sensed, records, 0)
-        first = b.mul(block, integer(self.width))
         self._put_observation(b, simd, given, emitted, entries, first)
         for k in range(self.width):
             index = b.add(first, integer(k))

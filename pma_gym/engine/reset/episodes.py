@@ -107,18 +107,20 @@ class Episodes(EngineMemory):
             self._check_prescription(wanted)
         count = len(indices)
         self._episodes[indices] += 1
-        if wanted is None and self._usual is not None:
-            settles, self._ranges[:count] = True, self._usual[indices]
-        else:
-            asked = [self.wanted[i] for i in indices.tolist()] if wanted is None else list(wanted)
-            settles = self._settles(asked)
-            if not settles:
-                try:
+        try:
+            self._draw_tasks(indices)
+            if wanted is None and self._usual is not None:
+                settles, self._ranges[:count] = True, self._usual[indices]
+            else:
+                usual = [self.wanted[i] for i in indices.tolist()]
+                asked = usual if wanted is None else list(wanted)
+                settles = self._settles(asked)
+                if not settles:
                     self._begin_drawn(indices, asked)
-                except BaseException:
-                    # The next one that can begin is this one.
-                    self._episodes[indices] -= 1
-                    raise
+        except BaseException:
+            # The next one that can begin is this one.
+            self._episodes[indices] -= 1
+            raise
         self._indices[:count] = indices
         self._begin(count, settles)
         if settles and count == self.count:
@@ -182,10 +184,7 @@ class Episodes(EngineMemory):
         draw = self.options.draw
         rows = []
         for index in indices.tolist():
-            key = self._keys[index].astype(np.uint64)
-            seed = int(key[0]) | int(key[1]) << 32
-            bits = np.random.Philox(key=seed, counter=[0, 0, 0, int(self._episodes[index])])
-            self.models[index] = self._checked(draw(self.nominal.model, np.random.Generator(bits)))
+            self.models[index] = self._checked(draw(self.nominal.model, self._generator(index, 0)))
             rows.append(vector(self.models[index], self.nominal.tolerance))
             block, lane = divmod(index, self.width)
             self._tables[block, :, lane] = self._table_of(rows[-1])

@@ -66,6 +66,7 @@ class Picture:
             RGB of shape (width / 2, width, 3), a new array each time.
         """
         self._rig.update(scene)
+        self._reference.set_ydata(scene.task.schedule.reference(self._times) / self._factor)
         stride = _stride(history.time)
         self._actual.set_data(history.time[::stride], history.position[::stride] / self._factor)
         self._now.set_data([scene.time], [scene.position / self._factor])
@@ -79,10 +80,10 @@ class Picture:
     def _add_position_plot(self, task: Task) -> None:
         schedule = task.schedule
         axes = self._plot((0.545, 0.46, 0.435, 0.44), task)
-        time = np.linspace(0.0, schedule.duration, 301)
-        axes.plot(
-            time,
-            schedule.reference(time) / self._factor,
+        self._times = np.linspace(0.0, schedule.duration, 301)
+        (self._reference,) = axes.plot(
+            self._times,
+            self._times,
             "--",
             color=REFERENCE,
             lw=1.4,
@@ -105,7 +106,7 @@ class Picture:
             labelcolor=INK,
             borderaxespad=0.1,
         )
-        self._moving += [(axes, self._actual), (axes, self._now)]
+        self._moving += [(axes, one) for one in (self._reference, self._actual, self._now)]
 
     def _add_voltage_plot(self, task: Task) -> None:
         axes = self._plot((0.545, 0.13, 0.435, 0.27), task)

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from pma_gym.engine.engine import Engine
 from pma_gym.engine.options import Options
+from pma_gym.tasks import Task
 from pma_gym.units import SI_FACTORS
 
 
@@ -22,6 +23,7 @@ class Scene(Protocol):
 
     Attributes:
         options: the environment's options.
+        task: the task of the episode.
         truth: true contraction (m), rotation (rad), load (N) and pressure (Pa) by name.
         position: true position of the controlled quantity (m, rad or N m).
         error: true position minus reference, in the same unit.
@@ -31,6 +33,9 @@ class Scene(Protocol):
     """
 
     options: Options
+
+    @property
+    def task(self) -> Task: ...  # noqa: D102
 
     @property
     def truth(self) -> Mapping[str, float]: ...  # noqa: D102
