@@ -48,13 +48,11 @@ class ObservationTable:
     Attributes:
         rows: (entry, scale of 1.0) in order.
         space: the observation space.
-        references: reference (m or rad) at every control step, and `preview` steps past the end.
     """
 
     def __init__(self, task: Task, options: Options) -> None:
-        """List the entries, and evaluate the reference at every step once."""
+        """List the entries."""
         schedule = task.schedule
-        self.references = step_references(task, options)
         self.rows = _rows(task, options)
         self.space = spaces.Box(-BOUND, BOUND, (len(self.rows),), np.float32)
         self._span = schedule.span

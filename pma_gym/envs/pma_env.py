@@ -59,7 +59,7 @@ class PMAEnv(Copies, SeededByReset, Episode, gym.Env[NDArray[np.float32], NDArra
     (`pma_gym.tasks.operator`) with a leg on the lever, and the regulator resists. A suffix sets
     another moment than 8 N m, `isotonic_exercise_6.5`, or the seed of a drawn reference,
     `displacement_speeds_17`. Instead of a name you can pass a `Task`, for example one that
-    `pma_gym.tasks.following` makes from a function.
+    `pma_gym.tasks.following` makes from a function. `reference` draws another one at every reset.
 
     ## Action
     A Box of shape (1,), or (2,) with `regulator_action`; values are clipped to -1 to 1.

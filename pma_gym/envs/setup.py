@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from pma_gym.effects.user_effects import source_of
 from pma_gym.engine.engine import Engine
+from pma_gym.engine.observation import step_references
 from pma_gym.engine.options import Options
 from pma_gym.pickling import Packed, packed
 from pma_gym.plant.model import Model
@@ -100,7 +101,7 @@ def _task(engine: Engine) -> dict[str, str]:
     if task.exercise is not None:
         said["task.exercise"] = _text(task.exercise)
     digest = hashlib.sha256(repr(task.structure).encode())
-    digest.update(engine.table.references.tobytes())
+    digest.update(step_references(task, engine.options).tobytes())
     digest.update(task.ideals(engine._samples).tobytes())
     return said | {"task.reference": f"{task.name} {digest.hexdigest()[:12]}"}
 

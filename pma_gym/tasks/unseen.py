@@ -14,6 +14,7 @@ what a station lacks for one.
 import re
 from collections.abc import Callable
 from dataclasses import replace
+from functools import lru_cache
 
 from pma_gym.data import motions
 from pma_gym.data.trial_schedule import Motion, Phase, TrialSchedule
@@ -184,6 +185,7 @@ UNSEEN: dict[str, Task] = _all()
 """One of each kind by name, such as `displacement_sine`; drawn ones of seed 0."""
 
 
+@lru_cache(128)
 def unseen(name: str) -> Task | None:
     """The drawn task of a name such as `rotation_steps_3` (of seed 3); None if it is no such name.
 

@@ -33,6 +33,7 @@ def stepped(env, steps, action=None):
         ("displacement", 50, {"action_delay_s": 0.02, "history": 2, "preview": 1}),
         ("rotation", 50, {"disturbances": "regulator_and_hand_push", "regulator_action": True}),
         ("isotonic", 50, {"observation_delay_s": 0.03, "randomisation": "varied"}),
+        ("displacement_speeds", 20, {"reference": "random", "preview": 2}),
         ("displacement_steps", 5, {"reward": lambda e, a, p, r: a - e * e, "noise": False}),
         ("profile_exercise", 5, {"reward": "smooth", "max_episode_steps": 4}),
     ],

@@ -27,6 +27,8 @@ def test_check_env_finds_nothing_to_say_of_a_cascade():
     # pytest turns each warning into an error.
     made = {"model": "cascade", "pressure_kpa": [300, 400.0], "noise": False}
     check_env(gym.make(DISPLACEMENT, **made).unwrapped)
+    drawn = {"task": "displacement_steps", "reference": "random"}
+    check_env(gym.make(DISPLACEMENT, **made, **drawn).unwrapped)
 
 
 @pytest.mark.parametrize("name", ENVIRONMENTS)

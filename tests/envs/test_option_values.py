@@ -36,6 +36,7 @@ SAME = [
     ("tolerance", np.array(1e-3), 1e-3),
     ("reward_scale", np.float32(0.5), 0.5),
     ("reward", np.str_("smooth"), "smooth"),
+    ("reference", np.array(["displacement"]), ["displacement"]),
 ]
 
 

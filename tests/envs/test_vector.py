@@ -59,6 +59,13 @@ CASES = {
         "disturbances": BOTH, "autoreset_mode": "SameStep"},
     ),
     **{
+        f"drawn references, {mode}": (
+            9, 2, RANDOM | {"task": "displacement_speeds", "reference": "random", "preview": 2,
+            "autoreset_mode": mode, "reward": reward},
+        )
+        for mode, reward in (("NextStep", "absolute"), ("SameStep", smooth))
+    },
+    **{
         task: (5, 2, RANDOM | {"task": task, "model": "station", "control_rate_hz": 100.0})
         for task in EXERCISES
     },

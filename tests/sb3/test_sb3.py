@@ -8,6 +8,7 @@ pytest.importorskip("stable_baselines3")
 
 from gymnasium.wrappers import TimeLimit
 from stable_baselines3 import PPO
+from stable_baselines3.common.env_checker import check_env
 from stable_baselines3.common.evaluation import evaluate_policy
 from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.vec_env import (
@@ -53,6 +54,19 @@ def test_a_batch_is_stable_baselines_own_loop(fragile, count):
             assert episode["r"] == pytest.approx(its["r"], abs=1e-5)
             np.testing.assert_equal(info, other)
     assert np.all(ends > 0)
+
+
+def test_references_are_drawn_for_every_episode():
+    made = MADE | {"task": "displacement_steps", "reference": "random", "max_episode_steps": 3}
+    check_env(PMAEnv(**made))
+    envs, names = SB3VecEnv(3, **made), []
+    envs.seed(1)
+    envs.reset()
+    for _ in range(2):
+        names += [task.name for task in envs.get_attr("task")]
+        *_, over, _ = [envs.step(np.zeros((3, 1))) for _ in range(3)][-1]
+        assert over.all()
+    assert len(set(names)) == 6
 
 
 def test_seeds_count_for_one_reset():
