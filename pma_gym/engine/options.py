@@ -311,6 +311,12 @@ def draw_task(task: Task, reference: object, generator: np.random.Generator) -> 
                 f"rotation_steps or rotation_speeds, and task {task.name} has none: make the "
                 "environment with one of these, or give tasks to draw from"
             )
+    if not isinstance(drawn, str | Task):
+        raise ValueError(
+            'reference must be "random", a task\'s name, a Task (pma_gym.tasks.following makes one '
+            "of a function of time), a list of these, or a function of a generator that returns "
+            f"one, got {drawn!r}"
+        )
     drawn = _known_task("reference", drawn, "random")
     own, other = ((t.structure, t.load, t.exercise) for t in (task, drawn))
     if own != other:

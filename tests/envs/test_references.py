@@ -245,8 +245,8 @@ def test_pictures_show_the_drawn_reference(make):
         ("isotonic_exercise", ["isotonic_exercise_6.5"], "isotonic_exercise_6.5 differs"),
         ("displacement_sine", sine("contraction"), "differs from task displacement_sine"),
         ("displacement_sine", ["displacment_steps"], "did you mean 'displacement_steps'?"),
-        ("displacement_sine", [], "got []"),
-        ("displacement_sine", lambda generator: 3, "got 3"),
+        ("displacement_sine", [], 'must be "random", a task\'s name, a Task'),
+        ("displacement_sine", lambda generator: 3, "that returns one, got 3"),
     ],
 )
 def test_references_of_another_kind_are_refused(task, reference, words):
