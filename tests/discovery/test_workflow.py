@@ -16,6 +16,7 @@ from pma_gym.data.files.trial_files import write_trial
 from pma_gym.data.trial import Trial
 from pma_gym.data.trial_columns import TrialError
 from pma_gym.discovery import workflow
+from pma_gym.discovery.fitting.free_parameters import at_limit
 from pma_gym.discovery.preparation.data_checks import check_dataset
 from pma_gym.discovery.selection.forward_selection import Selection
 from pma_gym.discovery.workflow import diagnose, refit
@@ -75,6 +76,7 @@ def test_the_true_model_agrees():
 def test_the_true_model_agrees_whatever_the_noise(seed):
     diagnosis = diagnose(measured(STATION, 4, rate=32.0, seed=seed), STATION, propose=False)
     assert diagnosis.verdict == "agrees"
+    assert min(each.p_value for each in diagnosis.candidates) > 0.01
     assert not diagnosis.where or min(place.p_value for place in diagnosis.where) > 1e-4
 
 
@@ -169,6 +171,13 @@ def test_a_limit_that_is_never_reached_has_its_own_size():
     limit = effect.parameters["limit_kpa_per_s"]
     assert effect.name == "regulator_rate_limit" and not diagnosis.unfitted
     assert limit.value == pytest.approx(600.0, rel=0.02) and limit.limit == ""
+
+
+def test_a_boundless_range_has_a_lower_end_only_where_it_begins():
+    """A value far above the lower end is not there because the upper end is farther."""
+    assert at_limit(638.0, 10.0, 1e9) == ""
+    assert at_limit(10.0, 10.0, 1e9) == "lower"
+    assert at_limit(1e9, 10.0, 1e9) == "upper"
 
 
 def test_an_effect_that_one_trial_of_three_shows_is_named():

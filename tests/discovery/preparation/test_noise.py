@@ -13,6 +13,7 @@ from pma_gym.discovery.preparation.initial_floors import Level, initial_floors
 from pma_gym.discovery.preparation.noise import (
     FIRST_REST_S,
     REST_S,
+    Whitening,
     level_at_rest,
     rest_readings,
     rest_segments,
@@ -31,6 +32,15 @@ def logged(motor, time=None, contraction=None):
     contraction = np.zeros(len(time)) if contraction is None else contraction
     commands = {"motor_voltage": motor, "regulator_voltage": np.full(len(time), 5.0)}
     return Logged.of(STATION, 0, Trial(time, commands, {"contraction": contraction}))
+
+
+def test_whitening_is_linear_and_missing_readings_leave_no_trace():
+    noise, missing = Whitening((0.9, -0.2), 0.5, 0.8), np.array([0, 17, 18, 199])
+    one, other = np.random.default_rng(1).standard_normal((2, 200))
+    first, second, sums = (noise.white(x[None], missing) for x in (one, other, 2 * one - other))
+    np.testing.assert_allclose(sums, 2 * first - second, atol=1e-12)
+    one[missing] = 1e6
+    assert np.array_equal(first, noise.white(one[None], missing))
 
 
 def test_rest_is_where_commands_have_long_been_constant():

@@ -1,10 +1,14 @@
 """What a verdict says: which figure is beyond its limit, and what is not sure."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import pytest
 
 from pma_gym.discovery.report.verdict_text import sentence
+from pma_gym.discovery.verdict import decision, unknown
+from pma_gym.discovery.verdict.adequacy import Adequacy
+from pma_gym.discovery.verdict.residual_fraction import ResidualFraction
 from pma_gym.discovery.verdict.unknown import Reason
 
 UNKNOWN = {
@@ -114,3 +118,78 @@ def test_the_headline_says_what_is_not_sure(answer):
     assert "but it fits load (" in said and "and run_2.csv worse than the model as given" in said
     pieces = tuple(replace(each, file="long.csv") for each in answer.trials)
     assert "this trial (in 3 pieces)" in sentence(replace(answer, trials=pieces))
+
+
+def made_up(chosen=("creep",), *, gate=True, missing=False, gain=200.0):
+    """Findings of which the best score, or fit, takes `gain` off a chi-square of 1000."""
+    fit = SimpleNamespace(chi_square=1000.0 - gain)
+    stage = SimpleNamespace(
+        gate=("some",) if gate else (),
+        missing=missing,
+        problem=None,
+        before=SimpleNamespace(chi_square=1000.0),
+        fits={"creep": fit, "filling": SimpleNamespace(chi_square=990.0)} if gate else {},
+        scores=[SimpleNamespace(candidate=SimpleNamespace(name="lvdt_error"), gain=gain)],
+    )
+    before = SimpleNamespace(
+        whitened_residuals=lambda _: SimpleNamespace(
+            sums=lambda *_: SimpleNamespace(chi_square=1000.0), logged=()
+        )
+    )
+    selection = SimpleNamespace(
+        stages=(stage,),
+        chosen=tuple(SimpleNamespace(name=name) for name in chosen),
+        fit=fit,
+        problem=before,
+    )
+    return SimpleNamespace(
+        adequacy=Adequacy({}),
+        selection=selection,
+        refitted=SimpleNamespace(model=None, values=None),
+        rivals=(),
+        unseen=None,
+        unseen_without=None,
+    )
+
+
+@pytest.fixture
+def same_size(monkeypatch):
+    """The scatter of each effect's size, by condition; as many as are in it, in turn."""
+    sizes = [{"trial": 0.12, "load": 0.0}, {"trial": 0.0, "load": 0.1}]
+    monkeypatch.setattr(
+        unknown, "homogeneity_test", lambda problem, fit, chosen, place: sizes[place]
+    )
+    return sizes
+
+
+@pytest.mark.parametrize(
+    ("left", "why", "figure", "limit"),
+    [
+        (ResidualFraction(0.4, 0.5), "slow", 0.4, unknown.MOST_LEFT),
+        (ResidualFraction(0.1, 0.5), "autocorrelated", 0.5, unknown.MOST_AUTOCORRELATED),
+    ],
+)
+def test_the_first_figure_beyond_its_limit_is_the_reason(same_size, left, why, figure, limit):
+    diagnosis = made_up(("creep", "filling"))
+    reason = unknown.why_unknown(diagnosis, left, [])
+    assert (reason.why, reason.figure, reason.limit) == (why, figure, limit)
+    assert (reason.effects, reason.leaves) == (("creep", "filling"), left.slow)
+    assert decision.verdict_of(diagnosis, reason, (), False, False) == "unknown"
+
+
+def test_a_size_that_scatters_is_named_with_where_it_scatters_most(same_size):
+    same_size[1].update(pressure=0.2, contraction=0.5)
+    both = made_up(("creep", "filling"))
+    reason = unknown.why_unknown(both, ResidualFraction(0.01, 0.0), [])
+    assert (reason.why, reason.of, reason.by) == ("scatters", "filling", "contraction")
+    assert (reason.figure, reason.limit) == (0.5, unknown.MOST_SPREAD)
+    widest = [unknown.widest_scatter(each) for each in (both, made_up(("creep",)), made_up(()))]
+    assert widest == [0.5, 0.12, 0.0]
+
+
+@pytest.mark.parametrize(("gain", "limit"), [(200.0, 260.0), (600.0, 690.0)])
+def test_a_law_that_explains_more_is_named_with_both_gains(same_size, gain, limit):
+    law = SimpleNamespace(gain=limit + 1.0, name="residual_load")
+    reason = unknown.why_unknown(made_up(gain=gain), ResidualFraction(0.1, 0.0), [law])
+    assert (reason.why, reason.of) == ("outdone", "residual_load")
+    assert (reason.figure, reason.limit, reason.gain) == (law.gain, pytest.approx(limit), gain)
