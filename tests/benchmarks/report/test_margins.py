@@ -10,6 +10,7 @@ import pytest
 from benchmarks.report.margins import (
     check_law,
     closed_poles,
+    is_linear,
     load_step,
     loops,
     margins,
@@ -145,6 +146,11 @@ def test_both_directions_are_looked_at_where_their_damping_differs():
     where = replace(station("rotation"), model=load_model("serres2008"))
     directions = [loop.direction for loop in loops([PID()], where, [0.5])]
     assert directions == ["relaxing", "contracting"]
+
+
+def test_feedforward_has_no_loop():
+    assert is_linear(PID())
+    assert not is_linear(ImprovedFeedforward())
 
 
 def test_law_of_another_period_is_refused():
