@@ -28,7 +28,6 @@ BUMP = {
     "residual_force_of_contraction": {"first_mm": 0.0, "reach_mm": 64.0}
     | {f"h{k}_n": 10.0 * (k == 3) for k in range(9)}
 }
-STEPS = sensors.resolutions(STATION)
 LEVELS = sensors.deviations(STATION)
 
 

@@ -17,7 +17,6 @@ from pma_gym.data.datasets.dataset import Dataset, NamedTrial, read_dataset
 from pma_gym.data.files.trial_files import write_trial
 from pma_gym.data.trial import Trial
 from pma_gym.discovery.workflow import diagnose
-from pma_gym.estimation.residuals import Residuals
 from pma_gym.plant.model import load_model, parse_model
 from tests.discovery.rig_trials import FROZEN
 
@@ -146,14 +145,6 @@ def logs(count=2, seconds=1.0, rate=150.0):
     return trials
 
 
-def test_a_trial_begins_as_fast_as_its_readings_say():
-    true = MODEL.replace(TRUE).with_effects({"coulomb_friction": DRY})
-    residuals = Residuals(true, logs(), [])
-    left = np.stack([each[:, 1] for each in residuals.each(residuals.start)])
-    assert float(np.mean(left**2)) == pytest.approx(1.0, abs=0.1)
-
-
-@pytest.mark.campaign
 def test_dry_friction_is_found_by_speed_alone_within_its_interval():
     diagnosis = diagnose(logs(), MODEL, propose=False)
     (effect,) = diagnosis.effects

@@ -18,7 +18,13 @@ from pma_gym.discovery import diagnose
 HIDDEN = Path(__file__).parent / "hidden"
 TRUTH = json.loads((HIDDEN / "truth.json").read_text(encoding="utf-8"))
 EFFECTS = [name for name, truth in TRUTH.items() if truth["effects"]]
-AT_EVERY_RUN = ("cable_slack", "parameters_1")
+AT_EVERY_RUN = (
+    "cable_slack",
+    "potentiometer_lag",
+    "sensor_quantisation",
+    "nothing_1",
+    "parameters_1",
+)
 """The others: `make test-campaigns`."""
 
 QUIET = [name for name, truth in TRUTH.items() if not truth["effects"]]

@@ -90,7 +90,6 @@ def test_what_a_joint_hides_is_named_with_its_size(hidden):
     assert all("deg" in place.region or " s " in place.region for place in diagnosis.where)
 
 
-@pytest.mark.campaign
 def test_a_joint_that_hides_nothing_has_no_effect_named():
     diagnosis = diagnose(logs(), joint(1.05 * INERTIA), propose=False)
     assert diagnosis.verdict in ("parameters", "agrees", "undecidable") and not diagnosis.effects
@@ -150,7 +149,6 @@ def late_logs(*channels):
     return trials
 
 
-@pytest.mark.campaign
 def test_one_late_column_is_that_sensors_delay_with_its_size():
     diagnosis = diagnose(late_logs("angle", "speed"), ARM, propose=False)
     assert diagnosis.verdict == "effect", diagnosis.sentence

@@ -164,16 +164,12 @@ def twelve_pulls():
     return driven_slide(12.0, lanes=12, seconds=0.4, rate=100)
 
 
-def fifteen_pulls():
-    return driven_slide(12.0, lanes=15, seconds=0.4, rate=100)
-
-
 def one_long_drive():
     return driven_slide(12.0, lanes=1, seconds=10.0)
 
 
 @pytest.mark.campaign
-@pytest.mark.parametrize("log", [twelve_pulls, fifteen_pulls, one_long_drive])
+@pytest.mark.parametrize("log", [twelve_pulls, one_long_drive])
 def test_dry_friction_is_found_in_a_driven_slide_and_is_not_taken_for_viscous(log):
     diagnosis = diagnose(log(), DRIVEN, propose=False)
     assert diagnosis.verdict == "effect", diagnosis.sentence

@@ -16,6 +16,7 @@ from pma_gym.data.files.trial_files import write_trial
 from pma_gym.data.trial import Trial
 from pma_gym.data.trial_columns import TrialError
 from pma_gym.discovery import workflow
+from pma_gym.discovery.fitting.free_parameters import at_limit
 from pma_gym.discovery.preparation.data_checks import check_dataset
 from pma_gym.discovery.selection.forward_selection import Selection
 from pma_gym.discovery.workflow import diagnose, refit
@@ -71,11 +72,11 @@ def test_the_true_model_agrees():
     assert np.multiply(floors, factors) == pytest.approx(LEVELS, rel=0.25)
 
 
-@pytest.mark.campaign
 @pytest.mark.parametrize("seed", [5, 6, 7])
 def test_the_true_model_agrees_whatever_the_noise(seed):
     diagnosis = diagnose(measured(STATION, 4, rate=32.0, seed=seed), STATION, propose=False)
     assert diagnosis.verdict == "agrees"
+    assert min(each.p_value for each in diagnosis.candidates) > 0.01
     assert not diagnosis.where or min(place.p_value for place in diagnosis.where) > 1e-4
 
 
@@ -163,6 +164,36 @@ def test_two_effects_are_both_named():
     assert effects["regulator_delay"]["delay_ms"].value == pytest.approx(20.0, abs=2.0)
 
 
+def test_a_limit_that_is_never_reached_has_its_own_size():
+    truth = STATION.with_effects({"regulator_rate_limit": {"limit_kpa_per_s": 600.0}})
+    diagnosis = diagnose(measured(truth, 3, kinds=(1,)), STATION, propose=False)
+    (effect,) = diagnosis.effects
+    limit = effect.parameters["limit_kpa_per_s"]
+    assert effect.name == "regulator_rate_limit" and not diagnosis.unfitted
+    assert limit.value == pytest.approx(600.0, rel=0.02) and limit.limit == ""
+
+
+def test_a_boundless_range_has_a_lower_end_only_where_it_begins():
+    """A value far above the lower end is not there because the upper end is farther."""
+    assert at_limit(638.0, 10.0, 1e9) == ""
+    assert at_limit(10.0, 10.0, 1e9) == "lower"
+    assert at_limit(1e9, 10.0, 1e9) == "upper"
+
+
+def test_an_effect_that_one_trial_of_three_shows_is_named():
+    """The other two hold neither it nor the parameters: of them alone the third is a guess."""
+    plant = Plant(laboratory("hysteresis")[1])
+    trials = laboratory("hysteresis")[0][1:2]
+    for seed, asked in enumerate(commanded(2)):
+        still = {name: np.full(len(asked), row[0]) for name, row in asked.commands.items()}
+        trials.append(plant.simulate(Trial(asked.time, still), seed=seed))
+    diagnosis = diagnose(trials, STATION, propose=False)
+    (effect,) = diagnosis.effects
+    assert (diagnosis.verdict, effect.name) == ("effect", "hysteresis"), diagnosis.sentence
+    # One trial, whose start is free, tells the force less well than many.
+    assert effect.parameters["force_n"].value == pytest.approx(6.0, rel=0.2)
+
+
 @pytest.mark.campaign
 def test_intervals_cover_the_truth():
     """Of all the parameters that moved, over several data sets, some 95 %."""
@@ -230,7 +261,6 @@ def test_other_trials_agree_with_the_amended_model(amended):
     assert diagnosis.verdict in ("agrees", "parameters") and not diagnosis.effects
 
 
-@pytest.mark.campaign
 def test_a_second_diagnosis_changes_nothing_beyond_the_first_ones_intervals(amended):
     first, model = diagnosed("hysteresis"), load_model(amended)
     second = diagnose(laboratory("hysteresis")[0], model, propose=False)
@@ -257,6 +287,17 @@ def test_a_refit_looks_for_nothing_and_judges_what_was_measured():
     assert {signal.rpartition("_")[0] for signal in diagnosis.gap} == set(EVERY[1:])
     assert set(diagnosis.floors) == set(diagnosis.gap)
     assert [trial.name for trial in diagnosis.trials] == [each.name for each in named]
+
+
+def test_the_reader_is_told_what_went_beyond_what_is_assumed():
+    gain = 2.0 * STATION.values_in_files("drive")["gain_n_per_v"]
+    strong = STATION.replace({"drive.gain_n_per_v": gain})
+    trials = measured(strong, 2, rate=32.0, kinds=(0, 0), kpa=(400.0, 520.0))
+    diagnosis = refit(trials, STATION)
+    assert diagnosis.parameters["drive.gain_n_per_v"].now.value == pytest.approx(gain, rel=0.01)
+    (said,) = (words for words in diagnosis.warnings if words.startswith("drive.gain_n_per_v"))
+    assert "beyond what is assumed beforehand (39.1 to 157 N/V)" in said
+    assert "widened 2 times" in said
 
 
 def test_a_refit_that_fits_its_own_readings_worse_is_discarded(monkeypatch):

@@ -19,7 +19,6 @@ from benchmarks.__main__ import app
 from benchmarks.comparison.add import SCORES, TIMES
 from benchmarks.comparison.compare import compare
 from benchmarks.comparison.job import chosen, run_comparison
-from benchmarks.executors.choice import ExecutorName, executor_named
 from benchmarks.executors.executor import ProcessDied, ThisProcess
 from benchmarks.runner import fingerprint, provenance
 from benchmarks.runner.case import cases, failed_row
@@ -225,23 +224,6 @@ def test_a_case_whose_process_died_is_run_again(suite, tmp_path):
             journal.append(row | {"key": todo.keys["pid"]})
         journal.append(failed_row(todo.cases[2], ValueError("no")) | {"key": todo.keys["pid"]})
     assert len(pending_cases(suite, entries, tmp_path).missing) == 5
-
-
-@pytest.mark.filterwarnings("ignore")
-@pytest.mark.campaign
-def test_a_ray_cluster_writes_the_rows_of_one_process(suite, tmp_path):
-    ray = pytest.importorskip("ray")
-    mine = own(tmp_path, "Mine")
-    executor = executor_named(ExecutorName.RAY, 2)
-    try:
-        code, _ = run(suite, f"pid,{mine}", tmp_path / "ray", executor)
-    finally:
-        ray.shutdown()
-    assert code == 0 and run(suite, f"pid,{mine}", tmp_path / "one")[0] == 0
-    assert table(tmp_path / "ray") == table(tmp_path / "one")
-    # What is done on the one is done for the other.
-    code, words = run(suite, "pid", tmp_path / "ray")
-    assert code == 0 and "6 cases are done in" in words
 
 
 def test_a_full_disk_ends_the_run_with_what_is_there(suite, tmp_path, monkeypatch):

@@ -36,9 +36,7 @@ from benchmarks.measured.trials import measured_dataset
 from pma_gym.data.datasets.dataset import read_dataset
 from pma_gym.data.files.trial_files import TrialWarning
 from pma_gym.data.serres2008 import load_table
-from pma_gym.discovery.preparation.initial_floors import initial_floors
 from pma_gym.discovery.result.candidate import ADDED
-from pma_gym.estimation.logged import Logged
 from pma_gym.plant.model import load_model
 
 
@@ -98,14 +96,6 @@ def test_what_is_diagnosed_holds_no_pressure_that_it_is_judged_on():
     assert len(DIAGNOSED_KPA) + len(UNSEEN_KPA) == 11
     for each in diagnosed(DIAGNOSED_KPA).trials:
         assert not any(f"_{pressure:.0f}kPa" in each.name for pressure in UNSEEN_KPA)
-
-
-def test_noise_comes_from_the_repeats():
-    data, model = diagnosed(DIAGNOSED_KPA), load_model("serres2008")
-    logged = [Logged.of(model, i, each.trial) for i, each in enumerate(data.trials)]
-    level = initial_floors(model, logged, data.trials)[0]
-    assert level.source == "repeats"
-    assert 0.4e-3 < level.level < 1.0e-3
 
 
 def test_written_trials_are_read_again(tmp_path):

@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 
 import benchmarks.bounds as module
 from benchmarks.__main__ import app
-from benchmarks.report.errors import Measure, SuiteRecord, is_bound, measures, pooled_measure
+from benchmarks.report.errors import Measure, SuiteRecord, measures, pooled_measure
 from benchmarks.report.leaderboard import Leaderboard, read_leaderboard
 from benchmarks.report.page import page_blocks
 from benchmarks.report.plots import profile_plot, styles_of
@@ -240,12 +240,6 @@ def test_spending_leaves_failed_cases_out_and_counts_them():
     # 10 ms of control period, 20 us of computing.
     assert spent.real_time_factor == pytest.approx(500.0)
     assert spent.saturated_percent == pytest.approx(1.0)
-
-
-def test_a_bound_is_who_may_see():
-    assert is_bound("oracle")
-    assert not is_bound("pid")
-    assert not is_bound("Mine")
 
 
 def write_run(tmp_path):

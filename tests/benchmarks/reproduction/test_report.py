@@ -249,10 +249,3 @@ def test_what_cannot_be_run_ends_in_one_message(arguments, message):
     assert done.exit_code == 2
     assert message in done.stderr
     assert done.stdout == ""
-
-
-def test_subcommands_are_dispatched(tmp_path):
-    out = tmp_path / "profiles.csv"
-    done = CliRunner().invoke(app, ["profiles", "--out", str(out)])
-    assert done.exit_code == 0
-    assert len(out.read_text().splitlines()) == 843

@@ -1,12 +1,5 @@
 """A rollout is the plant under held commands, whoever commands; cases do not disturb each other."""
 
-import os
-import signal
-import subprocess
-import sys
-import time
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -15,13 +8,11 @@ from benchmarks.executors.executor import ThisProcess, run_all
 from benchmarks.reproduction.results import csv_text, scores_of
 from benchmarks.runner.controller_spec import ControllerError, ControllerSpec
 from benchmarks.runner.execution import execute, pending_cases
-from benchmarks.runner.journal import JOURNAL, case_rows
 from benchmarks.runner.rollout import make_environment, rollout
 from benchmarks.suites.frozen import load_suite
 from pma_gym.plant.model import load_model
 from pma_gym.plant.plant import Plant
 
-ROOT = Path(__file__).parents[3]
 MODEL = "serres2008"
 
 
@@ -162,39 +153,6 @@ def test_an_interrupt_leaves_what_is_done():
 
     assert not run_all([int, int, int], ThisProcess(), on_done)
     assert kept == [0, 1]
-
-
-@pytest.mark.campaign
-def test_ctrl_c_leaves_finished_cases_and_the_earlier_results(tmp_path):
-    marker, out = tmp_path / "third", tmp_path / "out"
-    out.mkdir()
-    (out / "scores.csv").write_text("earlier\n")
-    body = f"self.pressure < 300 or open({str(marker)!r}, 'w').close(); return 1.0"
-    spec = controller_file(tmp_path, body.replace("; ", "\n        time.sleep(0.002)\n        "))
-    command = [sys.executable, "-m", "benchmarks", "--out", str(out), "--model", MODEL]
-    command += ["--controllers", spec.source, "--task", "displacement", "--jobs", "1"]
-    with subprocess.Popen(
-        command,
-        cwd=ROOT,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        start_new_session=True,
-        # A test run in the background ignores Ctrl-C, and its children would inherit that.
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
-    ) as process:
-        deadline = time.monotonic() + 60
-        while not marker.exists() and time.monotonic() < deadline and process.poll() is None:
-            time.sleep(0.05)
-        os.killpg(process.pid, signal.SIGINT)
-        output, errors = process.communicate(timeout=60)
-    assert process.returncode == 130, errors
-    assert "Interrupted" in output and "of 9 cases are done" in " ".join(output.split())
-    assert "Traceback" not in errors
-    rows = list(case_rows(out / JOURNAL))
-    # The case in progress is dropped: three are done when the fourth begins.
-    assert 3 <= len(rows) < 9
-    assert (out / "scores.csv").read_text() == "earlier\n"
 
 
 class Learns(Returns):

@@ -1,6 +1,5 @@
 """The suite is what the dissertation ran; a case's seed depends on its name alone."""
 
-import pickle
 from dataclasses import replace
 
 import pytest
@@ -99,12 +98,6 @@ def test_rows_of_another_model_are_not_used_again_and_fewer_trials_are(tmp_path)
     other = suite.select([str(path)])
     assert len({suite.digest, one.digest, other.digest}) == 3
     assert suite.select(tasks=["rotation"], pressures_kpa=[300]).digest == suite.digest
-
-
-def test_a_suite_travels_to_other_processes_with_its_models():
-    suite = load_suite().select(["serres2008", "station"], tasks=["rotation"])
-    there = pickle.loads(pickle.dumps(suite))
-    assert (there.models, there.digest) == (suite.models, suite.digest)
 
 
 def test_a_selection_says_so():

@@ -72,6 +72,8 @@ def test_drawn_stations_carry_the_leg_that_controllers_are_told_of():
     envs.reset(seed=1)
     models = envs.engine.models
     assert {model.name for model in models} == {"station-0", "station-1"}
+    # What controllers are told is the nominal one.
+    assert envs.engine.nominal_model.name == "station"
     nominal = envs.engine.nominal.parameters["leg"]
     assert nominal.inertia > 0.0 and all(model.parameters["leg"] == nominal for model in models)
     assert "hand_push" in models[0].parameters

@@ -16,7 +16,6 @@ from benchmarks.training.stations import (
     Stations,
     training_recipe,
 )
-from pma_gym.envs import PMAVectorEnv
 from pma_gym.plant.model import load_model
 
 
@@ -60,15 +59,3 @@ def test_the_draws_differ_in_their_parameters():
 def test_a_suite_without_stations_is_refused():
     with pytest.raises(SuiteError, match="draws no stations; train on those of robust"):
         training_recipe("nominal")
-
-
-def test_episodes_are_on_drawn_stations_with_an_operator():
-    drawn = Stations("robust", 0, 2)
-    given = drawn.options | {"pressure_kpa": 300.0}
-    envs = PMAVectorEnv(6, "displacement", disturbances="regulator_and_hand_push", **given)
-    envs.reset(seed=1)
-    names = {model.name for model in envs.engine.models}
-    assert names == {"station-0", "station-1"}
-    # What controllers are told is the nominal one.
-    assert envs.engine.nominal_model.name == "station"
-    envs.close()

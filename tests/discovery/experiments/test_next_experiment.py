@@ -6,16 +6,13 @@ import pytest
 
 from pma_gym.data.trial import Trial
 from pma_gym.discovery import diagnose
-from pma_gym.discovery.experiments.detectability import chance_to_show, experiment_to_detect
 from pma_gym.discovery.experiments.excitation import is_safe, library
-from pma_gym.discovery.experiments.next_experiment import Discrimination, next_experiment
+from pma_gym.discovery.experiments.next_experiment import next_experiment
 from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
 from pma_gym.discovery.fitting.fit_problem import FitProblem, Fitted
 from pma_gym.discovery.fitting.free_parameters import FreeParameters, prior
 from pma_gym.discovery.preparation.noise import white_noise
 from pma_gym.discovery.screening.candidates import candidate_effects
-from pma_gym.discovery.screening.probe_scores import Baseline
-from pma_gym.discovery.screening.score_test import SHOWN_GAIN, screen
 from pma_gym.plant import sensors
 from pma_gym.plant.model import Model, load_model
 from pma_gym.plant.plant import Plant
@@ -105,18 +102,6 @@ def test_proposed_trial_tells_what_was_promised(true):
     assert proposal.minutes == pytest.approx(proposal.trial.duration / 60.0)
 
 
-def test_it_tells_more_a_minute_than_most_of_the_library():
-    _, on, rivals, proposal = case("hysteresis")
-    discrimination = Discrimination.of(on, rivals, 0)
-    hopes = {
-        each.name: float(np.min(discrimination.odds([each], discrimination.pairs()))) / each.minutes
-        for each in library([*discrimination.models, on.given], 0)
-    }
-    assert proposal is not None
-    others = [rate for name, rate in hopes.items() if name != proposal.excitation]
-    assert hopes[proposal.excitation] > np.median(others)
-
-
 def test_the_same_seed_proposes_the_same_trial():
     """It is commands and nothing else; one rival needs no experiment."""
     _, on, rivals, proposal = case("hysteresis")
@@ -157,28 +142,6 @@ def test_a_rig_of_narrow_limits_gets_smaller_loads():
     for each in few:
         assert np.max(each.simulated[0].truth["load"]) <= 0.9 * 700.0
         assert np.max(each.simulated[0].truth["contraction"]) <= 0.9 * 50e-3
-
-
-def test_effects_that_were_hidden_are_made_to_show():
-    _, on, _, _ = case("hysteresis")
-    fit = on.fit(station())
-    assert fit is not None
-    wanted = [every()[name] for name in ("hysteresis", "creep", "drive_saturation")]
-    baseline = Baseline.at(on.whitened_residuals(fit.model), fit.values, fit.steps)
-    scores = screen(baseline, wanted, 0, lambda candidate: on.probed(fit.model, candidate))
-    hidden = [each.candidate.name for each in scores if (each.resolvable or np.inf) > 1.0]
-    assert "creep" in hidden
-    proposal = experiment_to_detect(on, fit, wanted, scores)
-    assert proposal is not None and "creep" in proposal.separates
-    assert set(proposal.separates) <= set(hidden)
-    assert proposal.expected_odds >= np.exp(12.5)
-    assert experiment_to_detect(on, fit, wanted, []) is None
-
-
-def test_the_chance_to_show_counts_sizes_in_proportion():
-    """A tenth of the usual size shows with a hundredth of the gain; a third lies half way."""
-    gains = SHOWN_GAIN * np.array([0.0, 1.0, 10.0, 100.0, 1e6])
-    assert chance_to_show(gains) == pytest.approx([0.0, 0.0, 0.5, 1.0, 1.0])
 
 
 @pytest.mark.campaign

@@ -50,20 +50,6 @@ def test_what_may_be_missing_is_what_the_rig_has():
     assert {"hysteresis", "creep", "contact_friction"} <= muscle
 
 
-def test_the_presliding_that_a_slide_hides_is_looked_for_at_every_size():
-    (friction,) = [c for c in candidate_effects(imposed()) if c.name == "contact_friction"]
-    path = "contact_friction.presliding_um"
-    assert path in friction.fitted_paths
-    looked = friction.probes[:, friction.paths.index(path)]
-    assert looked.min() <= 10.0 and looked.max() >= 2000.0
-
-
-def test_a_ripple_is_looked_for_about_its_usual_number_of_periods():
-    (ripple,) = [c for c in candidate_effects(imposed()) if c.name == "cogging"]
-    looked = np.unique(ripple.probes[:, ripple.paths.index("cogging.periods_per_m")])
-    np.testing.assert_allclose(looked, 12.5 * np.arange(1, 21))
-
-
 def test_averaged_rows_record_a_motion_of_less_bandwidth():
     fast = imposed().replace({"imposed_motion.bandwidth_hz": 40.0})
     rows = slice(None, None, 4)

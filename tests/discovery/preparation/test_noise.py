@@ -1,10 +1,9 @@
-"""Noise: levels, autoregressions, rest, steps, and what is slow."""
+"""Noise of sensors: where a rig rests, from repeats, and as a lab states it."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.signal import lfilter
 
 from pma_gym.data.datasets.dataset import NamedTrial
 from pma_gym.data.datasets.lab_sensors import LabSensor
@@ -15,13 +14,10 @@ from pma_gym.discovery.preparation.noise import (
     FIRST_REST_S,
     REST_S,
     Whitening,
-    autoregression,
     level_at_rest,
     rest_readings,
     rest_segments,
-    slow_part,
     step_between,
-    white_noise,
 )
 from pma_gym.discovery.preparation.quantisation import coarse_sensors, is_coarse
 from pma_gym.estimation.logged import Logged
@@ -29,12 +25,6 @@ from pma_gym.plant.model import Model
 from tests.discovery.laboratory import LEVELS, STATION, measured
 
 CHANNELS = range(4)
-NONE = np.empty(0, np.int64)
-
-
-def coloured(coefficients, innovation, count, seed=0):
-    driven = innovation * np.random.default_rng(seed).standard_normal(count + 1000)
-    return lfilter([1.0], [1.0, *(-np.asarray(coefficients))], driven)[1000:]
 
 
 def logged(motor, time=None, contraction=None):
@@ -44,58 +34,13 @@ def logged(motor, time=None, contraction=None):
     return Logged.of(STATION, 0, Trial(time, commands, {"contraction": contraction}))
 
 
-@pytest.mark.parametrize("coefficients", [(0.7,), (-0.4,), (1.2, -0.5), (0.3, 0.4)])
-def test_autoregression_recovers_what_made_the_noise(coefficients):
-    parts = [coloured(coefficients, 2e-3, 5000, seed) for seed in range(4)]
-    noise_filter = autoregression(parts, 0.0)
-    assert len(noise_filter.coefficients) >= len(coefficients)
-    padded = np.zeros(len(noise_filter.coefficients))
-    padded[: len(coefficients)] = coefficients
-    np.testing.assert_allclose(noise_filter.coefficients, padded, atol=4 / np.sqrt(20000))
-    assert noise_filter.innovation == pytest.approx(2e-3, rel=0.03)
-    assert noise_filter.level == pytest.approx(np.std(np.concatenate(parts)), rel=0.03)
-
-
-def test_what_a_series_does_not_tell_stays_as_it_was():
-    """White noise has no memory, a level that is known is the least, few readings say nothing."""
-    parts = [coloured((), 3.0, 2000, seed) for seed in range(3)]
-    assert autoregression(parts, 0.0).coefficients == ()
-    noise_filter = autoregression([coloured((0.6,), 1.0, 4000)], 5.0)
-    assert noise_filter.level == 5.0
-    assert noise_filter.innovation == pytest.approx(5.0 * np.sqrt(1 - 0.6**2), rel=0.05)
-    assert autoregression([coloured((0.6,), 1.0, 50)], 2.0) == white_noise(2.0)
-
-
-@pytest.mark.parametrize("coefficients", [(), (0.8,), (1.2, -0.5)])
-def test_whitened_noise_is_white_and_of_variance_one(coefficients):
-    series = coloured(coefficients, 0.3, 8000, 5)
-    level = float(np.std(coloured(coefficients, 0.3, 200000, 6)))
-    known = Whitening(coefficients, 0.3, level)
-    learnt = autoregression([coloured(coefficients, 0.3, 8000, 7)], 0.0)
-    for noise_filter, near in ((known, 0.0), (learnt, 0.03)):
-        white = noise_filter.white(series[None], NONE)[0]
-        assert np.mean(white**2) == pytest.approx(1.0, abs=4 * np.sqrt(2 / 8000) + near)
-        for lag in range(1, 8):
-            assert abs(np.mean(white[:-lag] * white[lag:])) < 4 / np.sqrt(8000) + near
-
-
 def test_whitening_is_linear_and_missing_readings_leave_no_trace():
     noise, missing = Whitening((0.9, -0.2), 0.5, 0.8), np.array([0, 17, 18, 199])
-    one, other = coloured((), 1.0, 200, 1), coloured((), 1.0, 200, 2)
+    one, other = np.random.default_rng(1).standard_normal((2, 200))
     first, second, sums = (noise.white(x[None], missing) for x in (one, other, 2 * one - other))
     np.testing.assert_allclose(sums, 2 * first - second, atol=1e-12)
     one[missing] = 1e6
     assert np.array_equal(first, noise.white(one[None], missing))
-
-
-def test_a_reading_without_a_whole_past_counts_by_the_level():
-    """Where every other reading is missing the rest still tell how large a residual is."""
-    noise = Whitening((0.5, 0.2), 0.8, 1.0)
-    series = np.random.default_rng(2).standard_normal((1, 2000))
-    missing = np.arange(1, 2000, 2)
-    white = noise.white(series, missing)
-    assert np.array_equal(white[0, ::2], series[0, ::2])
-    assert not white[0, missing].any()
 
 
 def test_rest_is_where_commands_have_long_been_constant():
@@ -111,31 +56,6 @@ def test_rest_is_where_commands_have_long_been_constant():
     assert level_at_rest([]) is None
 
 
-def test_gaps_do_not_leak():
-    contraction = 1e-3 + 1e-5 * np.random.default_rng(1).standard_normal(640)
-    contraction[::7] = np.nan
-    trial = logged(np.ones(640), contraction=contraction)
-    segments = rest_readings([trial], 0)
-    assert level_at_rest(segments) == pytest.approx(1e-5, rel=0.15)
-    assert rest_readings([trial], 2) == []
-    each = autoregression(segments, 0.0)
-    numbers = [each.level, each.innovation, *each.coefficients, slow_part(segments, 64.0)]
-    white = each.white(trial.measured[0][None], trial.missing[0])
-    assert np.isfinite([*numbers, *white[0]]).all()
-
-
-@pytest.mark.parametrize(
-    ("step", "digits"), [(1.234e-5, 7), (3.217e-4, 6), (3.217e-4, 12), (0.0, 12)]
-)
-def test_the_step_of_readings_is_found_and_continuous_ones_have_none(step, digits):
-    values = np.random.default_rng(2).normal(0.02, 20 * step or 1e-4, 640)
-    # As a file with some digits has them.
-    values = np.round(step * np.round(values / step), digits) if step else values
-    trial = logged(np.ones(640), contraction=values)
-    assert step_between([trial], 0) == pytest.approx(step, rel=0.01)
-    assert step_between([trial], 3) == 0.0
-
-
 def test_noise_at_rest_is_the_sensors_and_the_daq_shows_its_step():
     readings = measured(STATION, 4, rate=128.0)
     trials = [Logged.of(STATION, i, trial) for i, trial in enumerate(readings)]
@@ -143,26 +63,6 @@ def test_noise_at_rest_is_the_sensors_and_the_daq_shows_its_step():
         level = level_at_rest(rest_readings(trials, channel))
         assert level == pytest.approx(LEVELS[channel], rel=0.2)
         assert step_between(trials, channel) == pytest.approx(signal.resolution, rel=1e-3)
-
-
-def test_white_noise_has_no_slow_part_and_a_slow_sine_is_all_slow():
-    white = [coloured((), 1.0, 4000, seed) for seed in range(4)]
-    slow = 2.0 * np.sin(2 * np.pi * 0.2 * np.arange(4000) / 128)
-    assert slow_part(white, 128.0) < 4 / np.sqrt(16000)
-    assert slow_part([slow], 128.0) == pytest.approx(2.0, rel=0.03)
-    assert slow_part([slow + part for part in white], 128.0) == pytest.approx(2.0, rel=0.06)
-    assert slow_part([], 128.0) == 0.0
-
-
-def test_a_signal_read_a_few_times_a_trial_is_no_series():
-    """Readings seconds apart: whitened by their level alone, and all misfit beyond it is slow."""
-    rng = np.random.default_rng(3)
-    # Within a trial all readings share what a wrong model misses: neighbours are not noise.
-    parts = [rng.normal(0.0, 5.0) + rng.normal(0.0, 1.0, 4) for _ in range(200)]
-    noise_filter = autoregression(parts, 1.0)
-    assert noise_filter.coefficients == ()
-    assert noise_filter.level == pytest.approx(np.sqrt(26.0), rel=0.2)
-    assert slow_part(parts, 0.2, 1.0) == pytest.approx(25.0, rel=0.3)
 
 
 def test_noise_of_a_few_readings_comes_from_repeats():

@@ -1,7 +1,6 @@
 """The contract: what a verdict needs before it denies missing structure."""
 
 from dataclasses import replace
-from functools import cache
 from types import SimpleNamespace
 
 import numpy as np
@@ -10,9 +9,7 @@ import pytest
 from pma_gym.data.datasets.dataset import Dataset, NamedTrial
 from pma_gym.data.trial import Trial
 from pma_gym.discovery.preparation.acceptance_floors import Stated, acceptance_floors, is_summary
-from pma_gym.discovery.preparation.splits import fold_of_rows, folds
-from pma_gym.discovery.verdict.adequacy import MOST_EXPLAINED, Residual, adequacy
-from pma_gym.discovery.verdict.flexible_regression import Explained, explained, variables
+from pma_gym.discovery.verdict.flexible_regression import explained, variables
 from pma_gym.discovery.verdict.worsened import worsened
 from pma_gym.discovery.workflow import refit
 from pma_gym.estimation.logged import Logged
@@ -129,37 +126,6 @@ def test_of_a_summary_the_printed_standard_errors_count():
 # -- regression ------------------------------------------------------------------------------------
 
 
-@cache
-def readings(number=6):
-    """Trials at nearly one pressure."""
-    asked = commanded(number, seconds=5.0, kpa=(300.0, 330.0))
-    return [Plant(STATION).simulate(each, seed=k) for k, each in enumerate(asked)]
-
-
-def regressed(made):
-    """What is explained of residuals that `made` makes of a trial's rows and its number."""
-    trials = logs(readings())
-    generator = np.random.default_rng(7)
-    parts = [generator.normal(size=len(each.time)) + made(each, k) for k, each in enumerate(trials)]
-    given = [variables(each, each.measured) for each in trials]
-    blocks = [100 * k + each.time.astype(int) for k, each in enumerate(trials)]
-    return explained(parts, given, [0 * each + k for k, each in enumerate(blocks)], blocks, 1)
-
-
-def test_of_noise_and_of_what_differs_from_trial_to_trial_nothing_is_explained():
-    """A slow drift, another in every trial, repeats with nothing."""
-    noise, waves = regressed(lambda *_: 0.0), np.random.default_rng(3).uniform(0.0, 6.0, 6)
-    assert abs(noise.mean) < 0.02
-    assert noise.bound(0.0125, np.random.default_rng(0)) < MOST_EXPLAINED**2
-    assert regressed(lambda logged, k: np.sin(0.9 * logged.time + waves[k])).mean < 0.2
-
-
-def late(logged):
-    """The command 40 ms late, less the command: what a delay leaves."""
-    off = np.interp(logged.time - 0.04, logged.time, logged.motor) - logged.motor
-    return off / max(off.std(), 1e-12)
-
-
 def held_by_a_loop(behind):
     """What is explained of white noise that a controller answers a row later: no structure."""
     interval, given, left = 4e-3, [], []
@@ -195,85 +161,6 @@ def test_noise_that_a_controller_answers_is_no_structure():
     assert abs(held_by_a_loop(1)) < 0.02
 
 
-STRUCTURE = {
-    "of the state": lambda logged, k: np.sin(logged.measured[0] / 4e-3),
-    "of the speed": lambda logged, k: np.sign(np.gradient(logged.measured[0])),
-    "of the command": lambda logged, k: np.cos(3.0 * logged.motor),
-    "of its history": lambda logged, k: late(logged),
-}
-
-
-@pytest.mark.parametrize("law", STRUCTURE)
-def test_what_follows_state_command_or_its_history_is_explained(law):
-    whole = np.mean([np.mean(STRUCTURE[law](e, 0) ** 2) for e in logs(readings())])
-    assert regressed(STRUCTURE[law]).mean > 0.5 * whole
-
-
-def test_the_bound_is_an_upper_one_that_narrows_with_data():
-    generator = np.random.default_rng(5)
-    above, widths = 0, []
-    for blocks in (10, 1000):
-        for _ in range(50):
-            share = generator.normal(0.1, 1.0, blocks) * 50.0
-            explained = Explained(share, np.full(blocks, 50.0))
-            bound = explained.bound(0.05, generator, 400)
-            above += bound >= 0.1
-            widths.append(bound - explained.mean)
-    assert 85 <= above <= 100
-    assert np.mean(widths[:50]) > 5.0 * np.mean(widths[50:])
-
-
-# -- adequacy --------------------------------------------------------------------------------------
-
-
-def judged(scale=1.0, unseen=1.0, seen=True, number=6, stated=None, law=None):
-    """Of true trials, with residuals of so many floors: in fitted readings and in others."""
-    trials = readings(number)
-    logged, known = logs(trials), floors(trials, stated)
-    generator = np.random.default_rng(11)
-
-    def left(size):
-        rows = [generator.normal(size=each.measured.shape) * LEVELS[:, None] for each in logged]
-        if law is not None:
-            rows = [r + law(e) * LEVELS[:, None] for r, e in zip(rows, logged, strict=True)]
-        return Residual([each.measured for each in logged], [size * row for row in rows])
-
-    return adequacy(
-        logged, left(unseen) if seen else None, left(scale), known, fold_of_rows(trials), 0
-    )
-
-
-def test_noise_is_adequate():
-    adequacy = judged()
-    assert adequacy.structure is None and adequacy.undecided is None
-    assert all(0.8 < each.misfit < 1.3 for each in adequacy.signals.values())
-
-
-@pytest.mark.parametrize(
-    ("case", "fault"),
-    [
-        ({"scale": 2.0, "unseen": 2.0}, "misfit"),
-        ({"unseen": 2.0}, "not predicted"),
-        ({"seen": False}, "not left out"),
-        ({"number": 1}, "wide"),
-    ],
-)
-def test_what_is_too_large_or_not_known_is_a_fault(case, fault):
-    adequacy = judged(**case)
-    assert {each.fault for each in adequacy.signals.values()} == {fault}
-    assert (adequacy.structure is not None) == (fault == "misfit")
-
-
-@pytest.mark.parametrize(("tolerance", "fault"), [(None, "explained"), (3.0, None)])
-def test_structure_of_the_size_of_the_noise_is_seen_unless_the_lab_is_content(tolerance, fault):
-    law = STRUCTURE["of the speed"]
-    wide = tolerance and Stated({name: tolerance * level for name, level in TRUE.items()})
-    adequacy = judged(law=lambda logged: 0.9 * law(logged, 0), stated=wide)
-    assert {each.fault for each in adequacy.signals.values()} == {fault}
-    # It lies below the limit of the misfit.
-    assert all(each.misfit < 1.5 for each in adequacy.signals.values())
-
-
 # -- verdicts --------------------------------------------------------------------------------------
 
 
@@ -292,7 +179,6 @@ def test_what_neither_repeats_nor_rests_agrees_by_a_tolerance_alone():
         assert "within 0.0493 mm in contraction" in content.sentence
 
 
-@pytest.mark.campaign
 @pytest.mark.parametrize("hidden", [HYSTERESIS, BUMP], ids=["hysteresis", "bump"])
 def test_a_refit_alone_does_not_call_a_wrong_structure_right(hidden):
     (effect, table), *_ = hidden.items()
@@ -303,15 +189,7 @@ def test_a_refit_alone_does_not_call_a_wrong_structure_right(hidden):
     assert "noise floors" in diagnosis.sentence
 
 
-# -- folds, signals --------------------------------------------------------------------------------
-
-
-def test_pieces_are_left_out_by_whole_files_or_in_contiguous_blocks():
-    two = ["a"] * 5 + ["b"] * 4
-    assert folds(9, two) == [[0, 1, 2, 3, 4], [5, 6, 7, 8]]
-    one = folds(12, ["a"] * 12)
-    assert one == [[0, 1], [2, 3], [4, 5], [6, 7], [8, 9], [10, 11]]
-    assert folds(9, [str(k) for k in range(9)]) == folds(9)
+# -- signals --------------------------------------------------------------------------------------
 
 
 def test_a_signal_that_got_worse_is_named_and_noise_is_not(example):

@@ -1,37 +1,15 @@
-"""Verdicts: each where it belongs, and an unknown with the figure that is beyond its limit."""
+"""What a verdict says: which figure is beyond its limit, and what is not sure."""
 
 from dataclasses import replace
 from types import SimpleNamespace
 
-import numpy as np
 import pytest
 
 from pma_gym.discovery.report.verdict_text import sentence
-from pma_gym.discovery.screening.autocorrelation import SURE, AutocorrelationTest
 from pma_gym.discovery.verdict import decision, unknown
 from pma_gym.discovery.verdict.adequacy import Adequacy
 from pma_gym.discovery.verdict.residual_fraction import ResidualFraction
 from pma_gym.discovery.verdict.unknown import Reason
-
-
-@pytest.mark.parametrize(
-    ("with_it", "without", "borne_out"),
-    [
-        ([90.0, 110.0, 100.0], [95.0, 150.0, 99.0], True),  # likelier in all
-        ([90.0, 90.0, 500.0], [95.0, 95.0, 100.0], True),  # in most folds
-        ([99.0, 200.0, 150.0], [100.0, 120.0, 110.0], False),
-        ([np.inf, 90.0, 101.0], [100.0, 95.0, 100.0], False),
-        (None, None, True),
-    ],
-)
-def test_trials_left_out_bear_an_effect_out_together_or_in_most_folds(with_it, without, borne_out):
-    unseen, unseen_without = (
-        None if each is None else SimpleNamespace(deviance=np.array(each))
-        for each in (with_it, without)
-    )
-    findings = SimpleNamespace(unseen=unseen, unseen_without=unseen_without)
-    assert decision._confirmed(findings) == borne_out
-
 
 UNKNOWN = {
     "slow": (
@@ -184,15 +162,6 @@ def same_size(monkeypatch):
     return sizes
 
 
-def test_what_is_within_its_limits_is_not_unknown(same_size):
-    left = ResidualFraction(unknown.MOST_LEFT, unknown.MOST_AUTOCORRELATED)
-    assert unknown.why_unknown(made_up(), left, [SimpleNamespace(gain=260.0)]) is None
-    assert decision.verdict_of(made_up(), None, (), False, False) == "effect"
-    # Nothing added and nothing slow is for other verdicts.
-    assert unknown.why_unknown(made_up(()), ResidualFraction(0.0, 0.0), []) is None
-    assert unknown.why_unknown(made_up((), gate=False), ResidualFraction(1.0, 1.0), []) is None
-
-
 @pytest.mark.parametrize(
     ("left", "why", "figure", "limit"),
     [
@@ -224,33 +193,3 @@ def test_a_law_that_explains_more_is_named_with_both_gains(same_size, gain, limi
     reason = unknown.why_unknown(made_up(gain=gain), ResidualFraction(0.1, 0.0), [law])
     assert (reason.why, reason.of) == ("outdone", "residual_load")
     assert (reason.figure, reason.limit, reason.gain) == (law.gain, pytest.approx(limit), gain)
-
-
-@pytest.mark.parametrize(("gate", "nearest"), [(True, "creep"), (False, "lvdt_error")])
-def test_what_remembers_itself_with_nothing_added_is_named_by_its_surest_signal(
-    monkeypatch, gate, nearest
-):
-    kept = {"contraction": 7.0, "rotation": 30.0, "load": 40.0, "pressure": 9.0}
-    autocorrelation_tests = {
-        name: AutocorrelationTest(0.0 if name == "load" else 0.2, score, 1.0)
-        for name, score in kept.items()
-    }
-    monkeypatch.setattr(
-        unknown, "autocorrelation_tests", lambda problem, fit: autocorrelation_tests
-    )
-    reason = unknown.why_unknown(
-        made_up((), gate=gate, missing=True), ResidualFraction(0.0, 0.0), []
-    )
-    assert (reason.why, reason.of) == ("unexplained", "rotation_deg")
-    assert (reason.figure, reason.limit) == (30.0, SURE)
-    assert (reason.effects, reason.nearest) == ((), nearest)
-    assert reason.leaves == pytest.approx(0.8)
-
-
-def test_a_scatter_that_slopes_alone_tell_is_not_believed_where_nothing_is_left(same_size):
-    # A dead zone with a smooth edge: its size scatters with the pressure by 586 %, to first order.
-    same_size[0].update(pressure=5.86)
-    assert unknown.why_unknown(made_up(), ResidualFraction(0.004, 0.0), []) is None
-    left = ResidualFraction(2.0 * unknown.DOUBTFUL, 0.0)
-    reason = unknown.why_unknown(made_up(), left, [])
-    assert (reason.why, reason.by, reason.figure) == ("scatters", "pressure", 5.86)

@@ -180,24 +180,6 @@ def test_both_simulators_agree_on_an_effect(effect):
     assert np.abs(own.q - other.q).max() < 0.03 * changed
 
 
-def test_mujoco_s_positions_are_of_order_2():
-    pytest.importorskip("mujoco")
-    damped = rig(SLIDE, damping=8.0, rate=100.0)
-    ends = []
-    for longest in (2e-3, 1e-3):
-        moved = mujoco_axis.simulate(
-            damped, (), Transmission(), lambda row, q: row / 100.0, 101, (0.1, 0.5), longest
-        )
-        ends.append(moved.q[-1])
-    # m q'' + c q' = t from q = 0.1, q' = 0.5.
-    m, c, time = 2.0, 8.0, 1.0
-    fast = 0.5 + m / c**2
-    exact = 0.1 + time**2 / 2.0 / c - m * time / c**2 + fast * m / c * (1.0 - math.exp(-c / m))
-    errors = [abs(each - exact) for each in ends]
-    assert errors[0] < 1e-5
-    assert errors[0] / errors[1] == pytest.approx(4.0, rel=0.1)
-
-
 def test_without_mujoco_the_message_names_the_extra(monkeypatch):
     monkeypatch.setitem(__import__("sys").modules, "mujoco", None)
     with pytest.raises(mujoco_axis.NoMujoco, match=r"pma-gym\[foreign\]"):
