@@ -11,13 +11,6 @@ from pma_gym.codegen.trace import operation_counts, trace
 from pma_gym.effects.arithmetic import exponential, sloping
 
 
-def test_the_exponentials_derivative_is_itself():
-    x = Graph().input("x", CHANGING)
-    value = trace(exponential, x)
-    (slope,) = derivative(value, [x])
-    assert slope is value
-
-
 @pytest.mark.parametrize("factor", [-1.0, -2.5, 1.0, 0.75])
 def test_it_follows_the_chain_rule_whatever_becomes_of_its_argument(factor):
     # A factor of -1 is simplified out of what the exponential is made of.

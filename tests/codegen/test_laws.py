@@ -23,6 +23,9 @@ def defined(text, name="law"):
 def test_all_texts_and_all_widths_have_the_same_bits(case, run_columns):
     expected = evaluate(case.outputs, case.given)
     assert all(np.isfinite(column).all() for column in expected)
+    if case.law is case.effect.rate:
+        # Of each memory a source and a decay: none grows by itself.
+        assert all((decay >= 0.0).all() for decay in expected[1::2])
     columns = [case.given[value.data] for value in case.inputs]
     one = defined(python_text(case.outputs, case.inputs, "law"))
     plain = [one(*map(float, row)) for row in zip(*columns, strict=True)]

@@ -33,15 +33,6 @@ def scaled(library):
     return library.function("scaled", [ctypes.c_double], ctypes.c_double)
 
 
-def test_a_library_is_kept_and_found_by_its_text(folder):
-    first = Library(text(factor=3.0))
-    again, other = Library(text(factor=3.0)), Library(text(factor=4.0))
-    assert (first.was_kept, again.was_kept, other.was_kept) == (False, True, False)
-    assert [scaled(library)(1.5) for library in (first, again, other)] == [4.5, 4.5, 6.0]
-    assert len(list(folder.glob("*.o"))) == 2
-    assert not list(folder.glob("*.partial"))
-
-
 def test_what_is_kept_is_not_built_again(folder, monkeypatch):
     built = []
 

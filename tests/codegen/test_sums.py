@@ -40,17 +40,6 @@ def test_what_is_late_is_added_last(graph):
     ]
 
 
-def test_a_sum_of_sums_is_one_with_their_signs(graph):
-    a, b, c, d = named(graph, "abcd")
-    assert terms_of(a - (b - (c + d))) == [("+", "a"), ("-", "b"), ("+", "c"), ("+", "d")]
-
-
-def test_products_are_fused_but_for_one_that_stands_alone(graph):
-    a, b, c, d = named(graph, "abcd")
-    assert terms_of(a * b + c - d * d) == [("+", "c"), ("+", "a", "b"), ("-", "d", "d")]
-    assert terms_of(a * b - c * d) == [("+", "a", "b"), ("-", "c", "d")]
-
-
 def test_what_is_asked_for_or_used_elsewhere_stays_a_term(graph):
     a, b, c = named(graph, "abc")
     inner, product = a + b, a * b

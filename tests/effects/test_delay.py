@@ -111,14 +111,6 @@ def test_a_step_arrives_late_after_a_tenth_of_it_the_wrong_way(station_with, nam
     assert np.trapezoid(1.0 - share, time) == pytest.approx(DELAY_S, rel=0.02)
 
 
-def test_delays_begin_at_rest_and_change_no_rest(station_with, station):
-    for name in ("drive_delay", "regulator_delay"):
-        plant = station_with(name)
-        rest, plain = plant.settle(3.0, 300e3), station.settle(3.0, 300e3)
-        columns = [plant.states.index(state) for state in station.states]
-        np.testing.assert_allclose(rest.state[columns], plain.state, rtol=1e-10, atol=1e-12)
-
-
 def test_delays_are_part_of_the_linear_system(station_with, station):
     late = station_with("drive_delay", delay_ms=1e3 * DELAY_S).linearize(300e3, 0.03)
     plain = station.linearize(300e3, 0.03)

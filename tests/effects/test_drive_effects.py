@@ -9,10 +9,8 @@ import pytest
 from pma_gym.data.serres2008 import load_table
 from pma_gym.effects import CATALOGUE
 from pma_gym.effects.arithmetic import cosine
-from pma_gym.effects.drive.current_imbalance import imbalance_load
 from pma_gym.effects.drive.drive_dead_zone import load_beyond_dead_zone
 from pma_gym.effects.drive.drive_lag import late_load
-from pma_gym.effects.drive.torque_ripple import ripple_load
 from pma_gym.plant.equilibrium.solver import equilibria_at
 
 VOLTAGES = np.array([0.0, 0.1, 0.2, 0.3, 0.5, 1.0, 2.0, 4.0])
@@ -78,16 +76,6 @@ def test_a_late_drive_follows_a_step_exponentially(station_with, share):
         assert arrived == pytest.approx(expected, rel=1e-5)
 
 
-def test_a_late_drive_is_part_of_the_linear_system(station_with, station):
-    late = station_with("drive_lag", time_constant_ms=20.0).linearize(300e3, 0.03)
-    plain = station.linearize(300e3, 0.03)
-    assert late.nstates == plain.nstates + 1
-    assert np.min(np.abs(late.poles() + 50.0)) < 1e-3
-    at = late.output_labels.index("extension"), late.input_labels.index("motor_voltage")
-    gains = [np.real(system.dcgain())[at] for system in (late, plain)]
-    assert gains[0] == pytest.approx(gains[1], rel=1e-4)
-
-
 def test_the_laws_cosine_is_exact_to_1e_11():
     values = np.concatenate([np.linspace(-300.0, 300.0, 20_001), np.linspace(-1e4, 1e4, 20_001)])
     assert np.abs(cosine(values) - np.cos(values)).max() < 1e-11
@@ -104,17 +92,6 @@ def test_ripple_comes_as_often_a_turn_as_it_says(station_with):
     assert np.abs(share).max() == pytest.approx(0.01, rel=1e-3)
     np.testing.assert_allclose(share, 0.01 * np.cos(24.0 * angles), atol=1e-8)
     assert np.ptp(angles) > np.radians(60.0)
-
-
-def test_ripple_repeats_after_a_period_and_has_no_mean():
-    p = CATALOGUE["torque_ripple"].parse(
-        {"amplitude_percent": 0.5, "periods": 12.0, "phase_deg": 40.0}
-    )
-    turn = np.linspace(0.0, 2.0 * np.pi, 241)[:-1]
-    loads = np.array([ripple_load(400.0, angle, p) for angle in turn])
-    assert loads.mean() == pytest.approx(0.0, abs=1e-9)
-    assert loads.max() <= 2.0 + 1e-12
-    np.testing.assert_allclose(loads, np.roll(loads, 20), atol=1e-9)
 
 
 def test_one_effect_of_the_drive_takes_what_the_one_before_gives():
@@ -155,16 +132,6 @@ def test_peaks_stand_where_the_slide_stands_at_every_pressure(station_with):
     # The cable gives by 1 mm between the loads that hold these places; a ripple over the angle from
     # no load would stand 10 mm apart.
     assert places[0] == pytest.approx(places[1], abs=2e-3)
-
-
-def test_it_swings_in_proportion_to_the_load_and_about_it():
-    p = CATALOGUE["current_imbalance"].usual
-    turn = np.linspace(0.0, 2.0 * np.pi, 361)[:-1]
-    loads = np.array([imbalance_load(400.0, angle, p) for angle in turn])
-    assert loads.mean() == pytest.approx(0.0, abs=1e-9)
-    assert np.abs(loads).max() == pytest.approx(0.025 * 400.0, rel=1e-3)
-    np.testing.assert_allclose(loads, np.roll(loads, 60), atol=1e-9)
-    assert imbalance_load(0.0, 0.3, p) == 0.0
 
 
 def fitted(columns, loads, chosen):

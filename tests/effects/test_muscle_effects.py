@@ -54,16 +54,6 @@ def stiffness_at(station, contraction, pressure=300e3):
     return (low - high) / 2e-4
 
 
-def test_a_held_branch_relaxes_with_its_own_time_constant():
-    p = CATALOGUE["creep"].parse({"stiffness_n_per_mm": 0.6, "time_constant_s": 2.0})
-    source, decay = creep_rate(0.0, p)
-    assert (source, decay) == (0.0, 0.5)
-    source, _ = creep_rate(-0.01, p)
-    # Pulled out, it pulls back.
-    assert source == pytest.approx(-6.0)
-    assert creep_force(-6.0) > 0.0
-
-
 @pytest.mark.parametrize("name", ["creep", "slow_creep"])
 def test_a_creeping_branch_only_ever_loses_energy(name):
     values = {"creep": 2.0, "slow_creep": 40.0}
@@ -184,18 +174,6 @@ def test_damping_by_load_peaks_at_middle_load_and_does_not_push():
     at = np.linspace(0.85, 1.15, 3001)
     slope = np.diff([load_factor(250e3, share * full, p) for share in at]) / np.diff(at)
     assert np.abs(np.diff(slope)).max() < 0.1
-
-
-def test_a_loaded_muscle_is_slower_with_damping_by_load(station_with, station):
-    time = np.concatenate([[0.0], np.arange(1e-3, 0.5, 1e-3)])
-    motor = np.where(time > 0.0, 4.5, 4.0)
-
-    def rise(plant):
-        way = run(plant, time, motor, 300e3)[1]["extension"]
-        way = (way - way[0]) / (way[-1] - way[0])
-        return time[np.argmax(way > 0.63)]
-
-    assert rise(station_with("load_dependent_damping")) > 1.5 * rise(station)
 
 
 def test_a_curved_spring_adds_its_polynomial():

@@ -12,7 +12,6 @@ import pytest
 
 from pma_gym.data.trial import Trial
 from pma_gym.effects import CATALOGUE
-from pma_gym.effects.sensors.potentiometer_backlash import play, play_rate
 from pma_gym.effects.sensors.sensor_delay import SENSOR_DELAYS
 from pma_gym.plant.equilibrium.solver import NoLoadEquilibria, equilibria_at
 from pma_gym.plant.model import Model, ModelError, load_model
@@ -184,14 +183,6 @@ def test_friction_in_the_bearing_is_told_by_the_direction_at_one_voltage(station
     np.testing.assert_allclose(missing[outwards], -force, atol=0.05)
 
 
-def test_without_it_the_load_is_that_of_the_voltage(station):
-    _, truth = slowly(station)
-    drive = station.model.parameters["drive"]
-    missing = drive.gain * MOTOR + drive.offset - truth["load"]
-    away_from_the_turn = (TIME > 4.0) & (TIME < 18.9) & (abs(TIME - 10.0) > 0.5)
-    assert np.abs(missing[away_from_the_turn]).max() < 0.05
-
-
 @pytest.mark.parametrize("width", [2.0, 5.0])
 def test_play_is_lost_at_every_turn(station_with, width):
     plant = station_with("potentiometer_backlash", width_deg=width)
@@ -211,15 +202,6 @@ def test_play_is_nowhere_but_in_the_potentiometer(station_with, station):
     readings, expected = slowly(station_with("potentiometer_backlash")), slowly(station)
     for name, values in expected[1].items():
         np.testing.assert_allclose(readings[1][name], values, atol=1e-5 * np.ptp(values) + 1e-12)
-
-
-def test_the_reading_never_runs_backwards():
-    p = CATALOGUE["potentiometer_backlash"].usual
-    for z in np.linspace(-1.0, 1.0, 41):
-        for spin in (-1.0, 1.0):
-            source, decay = play_rate(spin, z, p)
-            reading = spin + play(source - decay * z, p)
-            assert -1e-12 <= reading * spin <= 1.0 + 1e-12
 
 
 def test_a_cascade_has_no_play():

@@ -98,12 +98,3 @@ def test_the_drive_cannot_unwind():
     # V = 0 asks for -2 N on the line; the drive gives none, and only the bearing slows the rotor.
     expected = np.exp(-7.64e-4 / 2e-3 * when)
     np.testing.assert_allclose(states[:, spin], expected, rtol=1e-9)
-
-
-def test_a_tight_cable_carries_the_muscle_back_when_the_drive_lets_go():
-    plant = Plant("serres2008")
-    start = plant.settle(3.0, 300e3)
-    _, _, truth = held(plant, start, 0.0, 2.0, 201)
-    assert truth["extension"][0] > 0.01
-    assert truth["extension"][-1] < 1e-3
-    assert truth["rotation"][-1] < truth["rotation"][0]

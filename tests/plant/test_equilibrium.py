@@ -36,15 +36,6 @@ def test_serres2008_rests_where_its_three_elements_say():
     assert rest.state[0] * 1e3 == pytest.approx((2.91 * 250.0 + 44.6 - load) / stiffness)
 
 
-def test_a_trial_that_begins_at_rest_stays_there():
-    for model in ("serres2008", "station", "cascade"):
-        plant = Plant(model)
-        rest = plant.settle(2.5, 350e3)
-        when, regulator = np.linspace(0.0, 5.0, 11), plant.regulator_voltage(350e3)
-        states, _ = plant.run(when, np.full(11, 2.5), np.full(11, regulator), condition=rest)
-        np.testing.assert_allclose(states[-1], rest.state, rtol=1e-9, atol=1e-7)
-
-
 def test_what_no_muscle_balances_is_refused():
     plant = Plant("serres2008")
     with pytest.raises(ValueError, match=r"balances a load of 976\.4 N .*lower the first motor"):

@@ -7,12 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pma_gym.codegen.text import python_text
-from pma_gym.codegen.trace import live_inputs
 from pma_gym.effects.slide.coulomb_friction import friction_force, friction_path
 from pma_gym.plant.model import load_model
 from pma_gym.plant.plant import Plant
-from pma_gym.plant.program import parameter_names
 from pma_gym.plant.simulation import Run, simulate_all
 from pma_gym.plant.statics import Condition
 
@@ -179,53 +176,6 @@ def test_the_path_is_a_line_then_a_parabola_then_full(direction):
     assert after(0.4, 0.0) == 0.4
     # Loaded and unloaded under 0.7, forth and back on one line.
     assert friction_path(friction_path(0.0, 5e-6, 1.0, P), -5e-6, -1.0, P) == 0.0
-
-
-def ramped_attempts(plant, state, zero, motor, slope, size, most):
-    """Attempts of plain Python through one row at 128 Hz: (taken, length, next size)."""
-    system = plant.program.first_order_hold
-    made = system.attempt
-    values = [*made.states, made.next_size, made.next_left, made.accepted, made.length]
-    inputs = live_inputs(values)
-    module = {}
-    exec(python_text(values, inputs, "attempt"), module)
-    entries = (*system.equations.states, *system.equations.rate_independent_states)
-    names = [entry.name for entry in entries]
-    known = dict(zip(["tolerance", *parameter_names(plant.model)], plant.vector, strict=True))
-    known |= dict(zip(plant.states, state, strict=True))
-    known |= {"zero_contraction": zero, "motor_voltage": motor, "motor_voltage_slope": slope}
-    known |= {"regulator_voltage": plant.regulator_voltage(345e3), "regulator_voltage_slope": 0.0}
-    known |= {"size": size, "left": 1.0 / 128.0}
-    for _ in range(most):
-        with np.errstate(all="ignore"):
-            attempt = module["attempt"](*(np.float64(known[one.data]) for one in inputs))
-        *after, known["size"], known["left"], accepted, length = attempt
-        known |= dict(zip(names, after, strict=True))
-        yield bool(accepted), float(length), float(known["size"])
-        if known["left"] <= 0.0:
-            return
-    pytest.fail(f"no end of the row after {most} attempts")
-
-
-@pytest.mark.parametrize("power", [-321, -200, -100, -50, -30, -20, -15])
-def test_a_slide_that_all_but_stands_breaks_away_in_few_attempts(power):
-    plant = Plant("serres2008")
-    for sign, slope in ((-1.0, -1000.0), (1.0, 200.0)):
-        rest = plant.settle(8.0, 345e3)
-        for memory in (-1.0, 0.0, 1.0):
-            state = rest.state.copy()
-            state[plant.states.index("velocity")] = sign * 10.0**power
-            state[plant.states.index("memory_coulomb_friction")] = memory
-            # In balance again, as after a hold: the bristles' force by the drive.
-            drive = plant.model.parameters["drive"]
-            force = friction_force(0.0, memory, P)
-            cable = plant.model.parameters["cable"]
-            radius = plant.model.parameters["rotor"].radius
-            state[plant.states.index("angle")] += force / cable.stiffness / radius
-            motor = 8.0 + force / drive.gain
-            tries = ramped_attempts(plant, state, rest.zero_contraction, motor, slope, 1.0, 60)
-            for accepted, length, size in tries:
-                assert accepted or size < length
 
 
 def test_a_long_hold_takes_hardly_more_than_an_attempt_a_row():

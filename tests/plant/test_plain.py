@@ -7,8 +7,6 @@ from pma_gym.integrator.step_attempt import first_size
 from pma_gym.plant.forms.plain import PlainPlant
 from pma_gym.plant.plant import Plant
 from pma_gym.plant.program import FIRST_S
-from pma_gym.plant.statics import Condition
-from tests.integrator.reference import demanding_commands
 
 MODELS = ("serres2008", "station", "cascade")
 
@@ -27,28 +25,6 @@ def test_rates_have_the_same_bits(both):
         state += 1e-3 * generator.standard_normal(rest.state.shape)
         given = (state, *generator.uniform(0.0, 10.0, 2), rest.zero_contraction)
         np.testing.assert_array_equal(plain.derivative(*given), plant.derivative(*given))
-
-
-def test_a_step_is_the_compiled_one_to_a_few_roundings(both):
-    plant, plain = both
-    rest = plant.settle(0.0, 350e3)
-    commands = demanding_commands(plant, 350e3)
-    states, zero = plant.run(
-        commands.time, commands.motor, commands.regulator, interpolation="zoh", condition=rest
-    )
-    size = np.abs(states).max(axis=0)
-    # So short that one attempt does, whatever the command has jumped by.
-    duration, compared = (1e-6 if plant.model.plant == "cascade" else 2e-4), 0
-    for row, state in enumerate(states[:-1]):
-        given = commands.motor[row], commands.regulator[row], duration
-        slow, fast = (Condition(state.copy(), zero) for _ in range(2))
-        if plain.step(slow, *given) > 1:
-            continue
-        plant.step(fast, *given)
-        # Compiled code rounds a product and a sum at once.
-        assert np.all(np.abs(slow.state - fast.state) <= 1e-13 * size)
-        compared += 1
-    assert compared > 30
 
 
 def test_the_attempts_are_the_compiled_ones(both):

@@ -7,8 +7,7 @@ import sys
 import numpy as np
 import pytest
 
-from pma_gym.codegen.machine import native
-from pma_gym.codegen.machine.native import Library, compiled, simd_lanes
+from pma_gym.codegen.machine.native import compiled, simd_lanes
 from pma_gym.plant import program as program_module
 from pma_gym.plant.model import load_model
 from pma_gym.plant.plant import Plant
@@ -79,22 +78,6 @@ def _columns(rows, seed):
     generator = np.random.default_rng(seed)
     motor, regulator = generator.uniform(0.0, 6.0, rows), generator.uniform(4.0, 8.0, rows)
     return np.cumsum(generator.uniform(0.002, 0.02, rows)), motor, regulator
-
-
-def test_few_passes_of_the_compiler_give_the_bits_of_all(monkeypatch):
-    def thorough(key, build, name, brief):
-        return Library.from_object(native.object_code(str(build())), name)
-
-    brief = Plant("serres2008").program
-    monkeypatch.setattr(program_module, "compiled", thorough)
-    monkeypatch.setattr(native, "_PASSES", None)
-    full = program_module.Program(brief.model)
-    for count in (2, 9):
-        runs, others = trials(count, "serres2008"), trials(count, "serres2008")
-        simulate_all(brief, runs)
-        simulate_all(full, others)
-        for one, other in zip(runs, others, strict=True):
-            np.testing.assert_array_equal(one.states, other.states)
 
 
 def test_only_what_is_asked_for_is_compiled(monkeypatch):
