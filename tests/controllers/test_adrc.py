@@ -49,15 +49,6 @@ def test_no_offset_is_left_of_a_constant_or_a_ramp(disturbance, delay, station, 
     assert abs(errors[-1]) < 5e-3 * np.abs(errors).max()
 
 
-def test_a_quick_observer_leaves_less(station, reading):
-    left = []
-    for bandwidth in (0.3, 0.6, 1.2):
-        controller = ADRC(Settings(0.6, bandwidth))
-        begun(controller, station)
-        left.append(np.abs(close(controller, reading, (0.5, 0.0), 300)).max())
-    assert left[0] > 1.5 * left[1] > 2.0 * left[2]
-
-
 @pytest.mark.parametrize("delay", [0.0, 0.02])
 def test_linear_law_is_what_it_does(delay, station, reading):
     controller = ADRC(Settings(0.6, 0.6))
@@ -73,20 +64,3 @@ def test_linear_law_is_what_it_does(delay, station, reading):
     # The strokes of the two references end some nanometres apart.
     assert got == pytest.approx(known, rel=1e-4, abs=1e-6)
     assert isinstance(controller, LinearController)
-
-
-def test_trials_on_the_nominal_station_at_50_hz_with_late_commands(drive):
-    loop = {"control_rate_hz": 50.0, "action_delay_s": 0.02}
-    got, _ = drive(ADRC(Settings(0.6, 0.35)), "displacement", 150, **loop)
-    assert got["displacement"] <= 0.05
-    got, _ = drive(ADRC(Settings(0.6, 0.35)), "rotation", 400, **loop)
-    assert max(got["I"], got["II"]) <= 0.25
-    got, _ = drive(ADRC(Settings(0.6, 0.6)), "isotonic", 200, **loop)
-    assert max(got.values()) <= 0.15
-
-
-def test_nominal_motion_is_worth_more_than_the_speed_alone(drive):
-    options = {"randomisation": "varied", "seed": 3}
-    whole, _ = drive(ADRC(Settings(0.6, 0.35)), "displacement", 200, **options)
-    speed, _ = drive(ADRC(Settings(0.6, 0.35, feedforward=0.0)), "displacement", 200, **options)
-    assert whole["displacement"] < speed["displacement"] < 0.2

@@ -1,7 +1,5 @@
 """Iterative learning: its inverse, its filter, its gains, and the noise floor that it reaches."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -9,6 +7,7 @@ from controllers import ILC
 from controllers.ilc import LearningGain, LiftedModel, Settings
 from controllers.models.nominal_motion import nominal_motion
 from pma_gym.envs import PMAEnv
+from tests.controllers.conftest import trial
 
 PERIOD = 0.01
 
@@ -91,20 +90,10 @@ def test_what_comes_and_goes_is_averaged():
     assert got[-1] < 0.2
 
 
-def trials(controller, env, nominal=None, count=10, seed=50):
+def trials(env, nominal=None, count=10):
     """RMSE (mm) by trial, each with noise of its own."""
-    left = []
-    for trial in range(count):
-        env.reset(seed=seed + trial)
-        information = env.station if nominal is None else replace(env.station, model=nominal)
-        controller.reset(env.reference, information)
-        ended, info = False, {}
-        while not ended:
-            volts = controller.act(env.measurement, env.time)
-            *_, terminated, truncated, info = env.step(env.action(volts))
-            ended = terminated or truncated
-        left.append(info["rmse_mm"])
-    return np.array(left)
+    controller = ILC(Settings(3.0, 0.3, 0.3))
+    return [trial(controller, env, 50 + k, nominal)["rmse_mm"] for k in range(count)]
 
 
 def drawn(task, pressure_kpa, seed, **loop):
@@ -120,8 +109,8 @@ def drawn(task, pressure_kpa, seed, **loop):
 def test_noise_floor_is_reached_in_ten_trials(loop):
     """As well as the same controller that was told the true model, within a fifth."""
     env, nominal = drawn("displacement", 150, seed=300, **loop)
-    learned = trials(ILC(Settings(3.0, 0.3, 0.3)), env, nominal)
-    errors = trials(ILC(Settings(3.0, 0.3, 0.3)), env)
+    learned = trials(env, nominal)
+    errors = trials(env)
     assert learned[0] > 2.0 * errors[0]
     assert np.mean(learned[-3:]) < 1.2 * np.mean(errors[-3:])
     # Nor does repeating make the noise grow.
@@ -130,7 +119,7 @@ def test_noise_floor_is_reached_in_ten_trials(loop):
 
 def test_contraction_by_the_regulator_is_learned():
     env, nominal = drawn("isotonic", 200, seed=301)
-    left = trials(ILC(Settings(3.0, 0.3, 0.3)), env, nominal, count=4)
+    left = trials(env, nominal, count=4)
     assert left[-1] < 0.5 * left[0]
 
 
@@ -158,9 +147,9 @@ def test_another_station_and_the_eleventh_trial_begin_anew(station, reading):
 
 def test_a_trial_that_broke_off_is_learned_from_as_far_as_it_came(station, reading):
     controller = ILC(Settings(3.0, 0.3, 0.3))
-    for trial in range(2):
+    for steps in (100, 0):
         controller.reset(lambda time: 5e-3 * time, station())
-        for k in range(100 if trial == 0 else 0):
+        for k in range(steps):
             controller.act(reading(extension=5e-3 * k * PERIOD - 1e-3), k * PERIOD)
     assert controller.learned[:100].any()
     assert not controller.learned[100:].any()

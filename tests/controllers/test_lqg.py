@@ -16,6 +16,7 @@ from controllers.observers.pressure_filter import PressureFilter
 from pma_gym.envs import Measurement, PMAEnv, StationInfo
 from pma_gym.plant.model import load_model
 from pma_gym.tasks import EVERY_TASK, RANDOMISATIONS
+from tests.controllers.conftest import by_phase, trial
 
 
 def station_of(task="displacement", pressure_kpa=300.0, model="station", rate=100.0, **delays):
@@ -158,20 +159,6 @@ def test_pressure_filter_keeps_noise_and_a_wrong_zero_away():
     assert np.abs(np.array(said) - 300e3).max() < 500.0
 
 
-@pytest.mark.parametrize("pressure", [150, 300, 550])
-def test_displacement_target(pressure, drive):
-    got, _ = drive(LQG(), "displacement", pressure)
-    assert got["displacement"] <= 0.05
-
-
-@pytest.mark.parametrize("pressure", [275, 550])
-def test_rotation_target(pressure, drive):
-    got, _ = drive(LQG(), "rotation", pressure)
-    assert got["I"] <= 0.25 and got["II"] <= 0.25
-    # Within 0.2 deg of what is achievable in phase III, whatever that is.
-    assert got["III"] <= 0.2
-
-
 @pytest.mark.parametrize(
     ("task", "late", "most"),
     [
@@ -187,26 +174,8 @@ def test_stations_that_differ_from_their_model(task, late, most):
         env = PMAEnv(
             task, model=model, pressure_kpa=300.0, control_rate_hz=rate, action_delay_s=late
         )
-        by_phase = run(env, LQG(), nominal)
-        assert max(by_phase.values()) <= most
-
-
-def run(env, controller, nominal):
-    env.reset(seed=1)
-    controller.reset(env.reference, replace(env.station, model=nominal))
-    ended = False
-    while not ended:
-        voltage = controller.act(env.measurement, env.time)
-        assert 0.0 <= voltage <= 10.0
-        *_, broken, ended, _ = env.step(env.action(voltage))
-        assert not broken
-    return env.episode_summary()[f"rmse_by_phase_{env.task.schedule.suffix}"]
-
-
-@pytest.mark.parametrize("task", ["isotonic", "triangle_low"])
-def test_regulator_as_actuator(task, drive):
-    got, _ = drive(LQG(), task, 150)
-    assert max(got.values()) <= 0.06
+        trial(LQG(), env, nominal=nominal)
+        assert max(by_phase(env).values()) <= most
 
 
 def test_a_regulator_that_jumps_is_made_good(drive):
@@ -228,18 +197,6 @@ def test_nothing_winds_up_while_the_drive_gives_all_it_has(drive):
     assert got["II"] > 5.0
     ideal, _ = drive(ImprovedFeedforward(), "rotation", 575, model="serres2008", noise=False)
     assert got["III"] < ideal["III"] + 0.1
-
-
-@pytest.mark.parametrize(("task", "late"), [("displacement", 0.02), ("rotation", 0.0)])
-def test_cascade_needs_no_cable(task, late, drive):
-    rate = 50.0 if late else 100.0
-    got, _ = drive(LQG(), task, 300, model="cascade", control_rate_hz=rate, action_delay_s=late)
-    assert max(got.values()) < (0.05 if task == "displacement" else 0.25)
-
-
-def test_late_readings_are_reckoned_with(drive):
-    got, _ = drive(LQG(), "rotation", 400, action_delay_s=0.02, observation_delay_s=0.03)
-    assert max(got.values()) < 0.3
 
 
 def test_local_model_of_first_order_has_no_room_for_a_rotor():

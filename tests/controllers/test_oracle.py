@@ -19,23 +19,10 @@ from pma_gym.envs import PMAEnv
 from pma_gym.metrics import SAMPLE_RATE_HZ
 from pma_gym.plant.plant import Plant
 from pma_gym.plant.statics import Condition
+from tests.controllers.conftest import trial
 
 LATE = {"control_rate_hz": 50.0, "action_delay_s": 0.02}
 DISTURBED = {"disturbances": "regulator_and_hand_push"}
-
-
-def commands_of(task, seed: int = 1, **options):
-    """Voltages that the oracle gave in an episode, and the environment."""
-    env = PMAEnv(task, **options)
-    env.reset(seed=seed)
-    oracle, ended, volts = Oracle(), False, []
-    oracle.receive(env)
-    oracle.reset(env.reference, env.station)
-    while not ended:
-        volts.append(oracle.act(env.measurement, env.time))
-        _, _, terminated, truncated, _ = env.step(env.action(volts[-1]))
-        ended = terminated or truncated
-    return np.array(volts), env
 
 
 # -- foresight -------------------------------------------------------------------------------------
@@ -95,13 +82,6 @@ def test_the_plan_is_never_worse_than_any_start_and_passes_over_what_is_no_numbe
     assert float(errors(optimum)[0] ** 2) <= best
 
 
-def test_a_plan_is_held_to_the_limits_period_by_period():
-    space = Space(np.array([0, 1, 1]), 1.0, 10.0)
-    changed = space.changed(np.array([2.0, 3.0, 9.0]), np.array([[-5.0, 2.0]]))
-    assert changed.tolist() == [[1.0, 5.0, 10.0]]
-    assert space.starts.tolist() == [0, 1]
-
-
 # -- horizon ---------------------------------------------------------------------------------------
 
 
@@ -150,16 +130,18 @@ def test_it_commands_the_regulator_where_that_is_the_actuator(drive):
         assert all(got[phase] < 0.8 * feedforward[phase] for phase in got)
 
 
-def test_no_noise_enters_it():
-    noisy, _ = commands_of("displacement", pressure_kpa=300.0)
-    other, _ = commands_of("displacement", seed=2, pressure_kpa=300.0)
-    silent, _ = commands_of("displacement", noise=False, pressure_kpa=300.0)
+def test_no_noise_enters_it(drive):
+    _, noisy = drive(Oracle(), "displacement", 300)
+    _, other = drive(Oracle(), "displacement", 300, seed=2)
+    _, silent = drive(Oracle(), "displacement", 300, noise=False)
     assert np.array_equal(noisy, silent) and np.array_equal(noisy, other)
 
 
-def test_it_does_not_know_disturbances_to_come():
-    calm, _ = commands_of("displacement", pressure_kpa=300.0)
-    disturbed, env = commands_of("displacement", pressure_kpa=300.0, disturbances="regulator")
+def test_it_does_not_know_disturbances_to_come(drive):
+    env = PMAEnv("displacement", pressure_kpa=300.0, disturbances="regulator")
+    trial(Oracle(), env)
+    _, calm = drive(Oracle(), "displacement", 300)
+    disturbed = env.voltages
     # It comes with this step, whose command is given before it.
     step = int(np.ceil(env.events.step_times[0] / env.options.period))
     assert np.array_equal(calm[: step + 1], disturbed[: step + 1])

@@ -2,7 +2,6 @@
 anew."""
 
 import re
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,6 +12,7 @@ from controllers.policy import PolicyError
 from controllers.policy_with_ilc import LEAST_SHARE, EarlierTrials, Softened, smooth
 from pma_gym.envs import Measurement, PMAEnv
 from pma_gym.plant.model import load_model
+from tests.controllers.conftest import trial
 
 PERIOD, STEPS = 0.01, 501
 READING = (1.0, 2.0, 3.0, 4.0)
@@ -26,18 +26,8 @@ def weaker():
 
 def trials(controller, seeds, env):
     """RMSE (mm) of each trial in turn."""
-    errors = []
-    for seed in seeds:
-        _, ended = env.reset(seed=seed), False
-        information = replace(env.station, model=load_model("station"))
-        controller.reset(env.reference, information)
-        while not ended:
-            volts = controller.act(env.measurement, env.time)
-            *_, terminated, truncated, info = env.step(env.action(volts))
-            ended = terminated or truncated
-        assert truncated
-        errors.append(info["rmse_mm"])
-    return errors
+    told = load_model("station")
+    return [trial(controller, env, seed, told)["rmse_mm"] for seed in seeds]
 
 
 def test_half_is_learned_at_the_corner_without_phase():

@@ -31,7 +31,7 @@ def test_the_equations(activation, output, scaled):
 @given(count=st.integers(0, 7), seed=st.integers(0, 99), start=st.integers(0, 3))
 def test_alone_or_among_many_are_the_same_bits(count, seed, start):
     draw = np.random.default_rng(seed)
-    weights = _weights(draw)
+    weights = drawn_weights(output="tanh", seed=seed)
     # Rows at every alignment that a slice of somebody's array may have.
     memory = draw.normal(size=count * 48 + start).astype(np.float32)[start:]
     rows = memory.reshape(count, 48)
@@ -39,15 +39,6 @@ def test_alone_or_among_many_are_the_same_bits(count, seed, start):
     alone = [Network(weights)(row.copy()) for row in rows]
     assert many.shape == (count, 1)
     assert many.tobytes() == b"".join(one.tobytes() for one in alone)
-
-
-def _weights(draw):
-    sizes = (48, 64, 64, 1)
-    layers = [
-        Layer(draw.normal(size=(n, m)).astype(np.float32), draw.normal(size=n).astype(np.float32))
-        for m, n in zip(sizes, sizes[1:], strict=False)
-    ]
-    return Weights(tuple(layers), "tanh", "tanh")
 
 
 def test_what_it_gave_stays():

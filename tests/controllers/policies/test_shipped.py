@@ -8,18 +8,7 @@ from controllers.models.voltage import nominal_offset
 from controllers.policies.policy_file import load_policy_file
 from controllers.policy import shipped_policies
 from pma_gym.envs import ENVIRONMENTS, PMAEnv
-
-
-def driven(environment, controller, seed=7):
-    environment.reset(seed=seed)
-    controller.reset(environment.reference, environment.station)
-    ended = False
-    while not ended:
-        volts = controller.act(environment.measurement, environment.time)
-        *_, terminated, truncated, info = environment.step(environment.action(volts))
-        ended = terminated or truncated
-    assert truncated
-    return info
+from tests.controllers.conftest import trial
 
 
 @pytest.mark.parametrize("path", shipped_policies(), ids=lambda path: path.stem)
@@ -32,23 +21,29 @@ def test_each_loads_and_has_a_card_that_says_how_to_make_it_again(path):
     assert training["code"] in card and "+" not in training["code"]
 
 
-@pytest.mark.parametrize("pressure", [200.0, 550.0])
-def test_displacement_is_followed_to_a_tenth_of_a_millimetre(pressure):
-    assert driven(PMAEnv("displacement", pressure_kpa=pressure), PPOPolicy())["rmse_mm"] <= 0.10
+LATE = {"control_rate_hz": 50.0, "action_delay_s": 0.02}
 
 
-@pytest.mark.parametrize("pressure", [300.0, 500.0])
-def test_rotation_is_followed_to_half_a_degree(pressure):
-    info = driven(PMAEnv("rotation", pressure_kpa=pressure), PPOPolicy())
-    assert max(info["rmse_I_deg"], info["rmse_II_deg"]) <= 0.5
-
-
-def test_the_late_loop_has_policies_of_its_own():
-    late = {"control_rate_hz": 50.0, "action_delay_s": 0.02}
-    disturbed = late | {"disturbances": "regulator_and_hand_push"}
-    assert driven(PMAEnv("displacement", pressure_kpa=300.0, **late), PPOPolicy())["rmse_mm"] < 0.4
-    info = driven(PMAEnv("rotation", pressure_kpa=400.0, **disturbed), PPOPolicy())
-    assert info["rmse_deg"] < 2.0
+@pytest.mark.parametrize(
+    ("task", "options", "scores", "most"),
+    [
+        *(("displacement", {"pressure_kpa": p}, ["rmse_mm"], 0.10) for p in (200.0, 550.0)),
+        *(
+            ("rotation", {"pressure_kpa": p}, ["rmse_I_deg", "rmse_II_deg"], 0.5)
+            for p in (300.0, 500.0)
+        ),
+        ("displacement", {"pressure_kpa": 300.0} | LATE, ["rmse_mm"], 0.4),
+        (
+            "rotation",
+            {"pressure_kpa": 400.0, "disturbances": "regulator_and_hand_push"} | LATE,
+            ["rmse_deg"],
+            2.0,
+        ),
+    ],
+)
+def test_references_are_followed_in_the_late_loop_too(task, options, scores, most):
+    info = trial(PPOPolicy(), PMAEnv(task, **options), seed=7)
+    assert max(info[score] for score in scores) <= most
 
 
 @pytest.mark.parametrize("path", shipped_policies(), ids=lambda path: path.stem)
@@ -57,7 +52,7 @@ def test_each_drives_the_task_that_it_was_trained_for(path):
     kwargs = dict(policy.file.environment["kwargs"])
     task = kwargs.pop("task", None) or ENVIRONMENTS[policy.file.environment["id"]]
     kwargs |= {"pressure_kpa": 400.0}
-    driven(PMAEnv(task, **kwargs), policy)
+    trial(policy, PMAEnv(task, **kwargs), seed=7)
 
 
 class Constant:
@@ -76,7 +71,7 @@ def test_operators_are_held_to_the_pace_in_every_phase():
 
     def pooled(controller):
         rows = [
-            [driven(env, controller, seed)[f"rmse_{phase}_deg"] for phase in ("I", "II", "III")]
+            [trial(controller, env, seed)[f"rmse_{phase}_deg"] for phase in ("I", "II", "III")]
             for seed in range(8)
         ]
         return np.sqrt(np.mean(np.square(rows), axis=0))
