@@ -7,7 +7,6 @@ import sys
 import numpy as np
 import pytest
 
-from pma_gym.cli import main
 from pma_gym.data.files.trial_files import read_trial, write_trial
 from pma_gym.data.trial import Trial
 from pma_gym.metrics import PHASE_SAMPLES, SAMPLE_RATE_HZ
@@ -15,20 +14,6 @@ from pma_gym.metrics import PHASE_SAMPLES, SAMPLE_RATE_HZ
 HEADER = "time_s,motor_voltage_v,regulator_voltage_v"
 WISHES = "time_s,motor_voltage_v,pressure_command_kpa"
 RAMP = f"{HEADER}\n0,0,5\n2,3,5\n4,3,5\n"
-
-
-@pytest.fixture
-def run(tmp_path, monkeypatch, capsys):
-    """Runs the command in a folder of its own: exit code, output, errors."""
-    monkeypatch.chdir(tmp_path)
-
-    def run(*arguments):
-        with pytest.raises(SystemExit) as caught:
-            main([str(argument) for argument in arguments])
-        printed = capsys.readouterr()
-        return caught.value.code or 0, printed.out, printed.err
-
-    return run
 
 
 @pytest.fixture

@@ -137,12 +137,11 @@ def test_a_table_of_two_inputs_is_linear_in_each_and_constant_outside():
 
 def test_what_laws_cannot_have_is_said():
     x = Graph().input("x", CHANGING)
-    with pytest.raises(
-        TypeError, match=r"laws have no np.arctan like this; of np they have .*tanh"
+    for message, act in (
+        (r"laws have no np.arctan like this; of np they have .*tanh", lambda: np.arctan(x)),
+        (r"use NumPy's functions, such as np.tanh\(x\), not math's", lambda: math.tanh(x)),
+        ("NotImplemented", lambda: np.exp(x) + np.zeros(2)),
     ):
-        np.arctan(x)
-    with pytest.raises(TypeError, match=r"use NumPy's functions, such as np.tanh\(x\), not math's"):
-        math.tanh(x)
-    with pytest.raises(TypeError, match="NotImplemented"):
-        np.exp(x) + np.zeros(2)
+        with pytest.raises(TypeError, match=message):
+            act()
     assert set(NUMPY) >= {"exp", "log", "tanh", "sqrt", "minimum", "maximum", "sin", "cos"}

@@ -155,22 +155,26 @@ def test_truths_combine(graph, x, y):
 
 
 def test_mistakes_are_named(graph, x):
-    with pytest.raises(TypeError, match="use where"):
-        bool(x > 0.0)
-    with pytest.raises(ValueError, match="two graphs"):
-        x + Graph().input("x", CHANGING)
-    with pytest.raises(ValueError, match="input x is real of level 2 already"):
-        graph.input("x", FIXED)
-    with pytest.raises(TypeError, match="no add of real and integer"):
-        x + graph.input("i", CHANGING, "integer")
-    with pytest.raises(TypeError, match="not made of 1.5"):
-        graph.input("i", CHANGING, "integer") + 1.5
-    with pytest.raises(TypeError, match="plain number of 0 to 63 bits"):
-        graph.input("i", CHANGING, "integer") << 64
-    with pytest.raises(TypeError, match="NotImplemented"):
-        x + np.zeros(2)
-    with pytest.raises(TypeError, match="unsupported operand"):
-        x + "1"
+    for error, message, act in (
+        (TypeError, "use where", lambda: bool(x > 0.0)),
+        (ValueError, "two graphs", lambda: x + Graph().input("x", CHANGING)),
+        (ValueError, "input x is real of level 2 already", lambda: graph.input("x", FIXED)),
+        (
+            TypeError,
+            "no add of real and integer",
+            lambda: x + graph.input("i", CHANGING, "integer"),
+        ),
+        (TypeError, "not made of 1.5", lambda: graph.input("i", CHANGING, "integer") + 1.5),
+        (
+            TypeError,
+            "plain number of 0 to 63 bits",
+            lambda: graph.input("i", CHANGING, "integer") << 64,
+        ),
+        (TypeError, "NotImplemented", lambda: x + np.zeros(2)),
+        (TypeError, "unsupported operand", lambda: x + "1"),
+    ):
+        with pytest.raises(error, match=message):
+            act()
     assert (np.float64(2.0) * x) is x * 2.0
 
 

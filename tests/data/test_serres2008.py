@@ -107,9 +107,10 @@ def test_arrays_are_read_only():
 
 
 def test_errors_say_what_there_is():
-    with pytest.raises(KeyError, match="no table 'I21'.*I1, I2, I3"):
-        load_table("I21")
-    with pytest.raises(KeyError, match="no column 'load'.*load_n, pressure_kpa"):
-        load_table("I1")["load"]
-    with pytest.raises(KeyError, match="no task 'pull'.*displacement, rotation"):
-        pressures("pull")
+    for message, act in (
+        ("no table 'I21'.*I1, I2, I3", lambda: load_table("I21")),
+        ("no column 'load'.*load_n, pressure_kpa", lambda: load_table("I1")["load"]),
+        ("no task 'pull'.*displacement, rotation", lambda: pressures("pull")),
+    ):
+        with pytest.raises(KeyError, match=message):
+            act()

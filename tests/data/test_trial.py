@@ -128,12 +128,19 @@ def test_the_error_of_a_sample_travels_between_processes():
 
 
 def test_extension_needs_a_contraction_at_the_start():
-    with pytest.raises(TrialError, match="has no contraction_mm; it has load_n"):
-        _ = trial(measurements={"load": TIME}).extension
-    with pytest.raises(TrialError, match="contraction_mm is empty at the first sample"):
-        _ = trial(measurements={"contraction": [np.nan, 0.1, 0.1]}).extension
-    with pytest.raises(TrialError, match="has no rotation_deg; it has no measurements"):
-        _ = trial(measurements={}).rotation
+    for message, act in (
+        (
+            "has no contraction_mm; it has load_n",
+            lambda: trial(measurements={"load": TIME}).extension,
+        ),
+        (
+            "contraction_mm is empty at the first sample",
+            lambda: trial(measurements={"contraction": [np.nan, 0.1, 0.1]}).extension,
+        ),
+        ("has no rotation_deg; it has no measurements", lambda: trial(measurements={}).rotation),
+    ):
+        with pytest.raises(TrialError, match=message):
+            act()
 
 
 def test_a_frame_has_a_row_a_sample_and_units_in_its_names(monkeypatch):

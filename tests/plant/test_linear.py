@@ -90,14 +90,17 @@ def test_signals_have_names():
 
 def test_refusals_say_what_can_be_reached():
     plant = Plant("serres2008")
-    with pytest.raises(ValueError, match=r"must lie in .* to 39.77 mm .* got 45 mm"):
-        linearize(plant, 300e3, 0.045)
-    with pytest.raises(ValueError, match=r"what a motor voltage of 0 to .* V holds"):
-        linearize(plant, 300e3, -0.05)
-    with pytest.raises(ValueError, match="pressure must lie in 0 to 578.6 kPa"):
-        linearize(plant, 700e3, 0.02)
-    with pytest.raises(ValueError, match="direction must be one of contracting, relaxing"):
-        linearize(plant, 300e3, 0.02, "sideways")
+    for message, act in (
+        (r"must lie in .* to 39.77 mm .* got 45 mm", lambda: linearize(plant, 300e3, 0.045)),
+        (r"what a motor voltage of 0 to .* V holds", lambda: linearize(plant, 300e3, -0.05)),
+        ("pressure must lie in 0 to 578.6 kPa", lambda: linearize(plant, 700e3, 0.02)),
+        (
+            "direction must be one of contracting, relaxing",
+            lambda: linearize(plant, 300e3, 0.02, "sideways"),
+        ),
+    ):
+        with pytest.raises(ValueError, match=message):
+            act()
 
 
 def numerical(plant, rates):

@@ -111,12 +111,21 @@ def test_attributes_are_those_of_each_environment():
     assert envs.get_attr("action_space") == [envs.action_space] * 3
     assert envs.get_attr("render_mode", indices=1) == [None]
     assert envs.has_attr("station_info") and not envs.has_attr("nothing")
-    with pytest.raises(AttributeError, match="nothing"):
-        envs.get_attr("nothing")
-    with pytest.raises(AttributeError, match=r"only the whole batch has.*\.envs\.num_envs"):
-        envs.get_attr("num_envs")
-    with pytest.raises(IndexError, match="no environment 3 in a batch of 3: numbers go from -3 to"):
-        envs.get_attr("task", indices=[0, 3])
+    for error, message, act in (
+        (AttributeError, "nothing", lambda: envs.get_attr("nothing")),
+        (
+            AttributeError,
+            r"only the whole batch has.*\.envs\.num_envs",
+            lambda: envs.get_attr("num_envs"),
+        ),
+        (
+            IndexError,
+            "no environment 3 in a batch of 3: numbers go from -3 to",
+            lambda: envs.get_attr("task", indices=[0, 3]),
+        ),
+    ):
+        with pytest.raises(error, match=message):
+            act()
 
 
 @pytest.mark.parametrize("name", ["pressure", "options", "mine"])

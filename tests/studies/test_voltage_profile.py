@@ -79,17 +79,25 @@ def test_the_model_is_linear_between_the_pressures():
 
 
 def test_beyond_the_map_the_error_names_what_can_be_reached():
-    with pytest.raises(ValueError, match=r"150 kPa: displacement must lie in 0-27\.2\d mm"):
-        feedforward(np.linspace(0, 0.04, 26), 150)
-    with pytest.raises(
-        ValueError, match="reference itself needs only 24.99 mm.*longer sample_time"
+    for error, message, act in (
+        (
+            ValueError,
+            r"150 kPa: displacement must lie in 0-27\.2\d mm",
+            lambda: feedforward(np.linspace(0, 0.04, 26), 150),
+        ),
+        (
+            ValueError,
+            "reference itself needs only 24.99 mm.*longer sample_time",
+            lambda: feedforward(np.arange(0, 0.025, 1e-5), 150, 0.002),
+        ),
+        (ValueError, "150-575 kPa.*got 600", lambda: feedforward([0.0], 600)),
+        (ValueError, "150-575 kPa.*got nan", lambda: profile_model(float("nan"))),
+        (
+            ValueError,
+            "displacement must lie in",
+            lambda: voltage_from_input([np.nan], TABLE_18[300]),
+        ),
+        (KeyError, "displacement, rotation", lambda: voltage_profile("pull", 300)),
     ):
-        feedforward(np.arange(0, 0.025, 1e-5), 150, 0.002)
-    with pytest.raises(ValueError, match="150-575 kPa.*got 600"):
-        feedforward([0.0], 600)
-    with pytest.raises(ValueError, match="150-575 kPa.*got nan"):
-        profile_model(float("nan"))
-    with pytest.raises(ValueError, match="displacement must lie in"):
-        voltage_from_input([np.nan], TABLE_18[300])
-    with pytest.raises(KeyError, match="displacement, rotation"):
-        voltage_profile("pull", 300)
+        with pytest.raises(error, match=message):
+            act()
