@@ -1,4 +1,7 @@
-"""LQG: gains against closed forms, its loop by separation, its filter, its targets."""
+"""LQG: gains against closed forms, its loop by separation, its filter, its targets.
+
+Feedback on a station that differs from its model: what is left of offsets and disturbances.
+"""
 
 import math
 from dataclasses import replace
@@ -6,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from controllers import LQG, ImprovedFeedforward
+from controllers import LQG, PID, ImprovedFeedforward, PreviewMPC
 from controllers.lqg import Settings, regulator, steady_gain
 from controllers.models.local_model import LocalModel
 from controllers.models.nominal_motion import nominal_motion
@@ -15,7 +18,7 @@ from controllers.observers.deviation_filter import SHARE, SHARE_TIME_S, Unknowns
 from controllers.observers.pressure_filter import PressureFilter
 from pma_gym.envs import Measurement, PMAEnv, StationInfo
 from pma_gym.plant.model import load_model
-from pma_gym.tasks import EVERY_TASK, RANDOMISATIONS
+from pma_gym.tasks import EVERY_TASK, RANDOMISATIONS, varied_station
 from tests.controllers.conftest import by_phase, trial
 
 
@@ -204,3 +207,31 @@ def test_local_model_of_first_order_has_no_room_for_a_rotor():
     one = LocalModel(np.array([[0.9]]), np.array([1e-3]), np.ones(1), 1e-2, 0.1)
     whole, push = with_disturbance(one)
     assert whole.tolist() == [[0.9, 1e-3], [0.0, 1.0]] and push.tolist() == [1e-3, 0.0]
+
+
+def driven(controller, task="displacement", **options):
+    """A trial on a drawn station at 50 Hz, commands 20 ms late: its last info, its environment."""
+    nominal = load_model("station")
+    model = varied_station(nominal, np.random.default_rng(3))
+    late = {"control_rate_hz": 50.0, "action_delay_s": 0.02}
+    env = PMAEnv(task, model=model, pressure_kpa=300.0, **late, **options)
+    return trial(controller, env, 3, nominal), env
+
+
+def test_integral_action_leaves_no_offset_where_another_station_is_held():
+    left = []
+    for controller in (LQG(), ImprovedFeedforward()):
+        _, env = driven(controller, task="rotation")
+        held = env.trajectory()[round(7.0 * 384) : round(9.5 * 384)]
+        left.append(abs(np.rad2deg(held.mean()) - 90.0))
+    # Half a step of the potentiometer's reading, 0.344 deg, cannot be seen.
+    assert left[0] < 0.172
+    assert left[0] < 0.1 * left[1]
+
+
+@pytest.mark.parametrize(("kind", "share"), [(LQG, 0.9), (PreviewMPC, 0.8)])
+def test_disturbances_move_it_less_than_the_pid(kind, share):
+    ours, pid = (
+        driven(each(), disturbances="regulator_and_hand_push")[0]["rmse_mm"] for each in (kind, PID)
+    )
+    assert ours < share * pid

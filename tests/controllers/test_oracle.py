@@ -1,10 +1,19 @@
-"""The oracle: foresees what comes, knows the true station, and nothing of what is to come."""
+"""The oracle: foresees what comes, knows the true station, and nothing of what is to come.
+
+The achievable bound: below every controller, zero where the drive can give all.
+
+The exact inverse is one of the ideal controllers and `ImprovedFeedforward` is the same: equal but
+for the rounding of the times at which a voltage changes.
+"""
+
+from functools import lru_cache
 
 import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
 
-from controllers import FeedforwardPID, ImprovedFeedforward, Oracle
+from benchmarks.bounds import achievable_bound
+from controllers import CONTROLLERS, FeedforwardPID, ImprovedFeedforward, Oracle
 from controllers.design.bounded_least_squares import Space, best_plan
 from controllers.oracle import (
     HORIZON_S,
@@ -17,6 +26,7 @@ from controllers.oracle import (
 )
 from pma_gym.envs import PMAEnv
 from pma_gym.metrics import SAMPLE_RATE_HZ
+from pma_gym.plant.model import load_model
 from pma_gym.plant.plant import Plant
 from pma_gym.plant.statics import Condition
 from tests.controllers.conftest import trial
@@ -146,3 +156,42 @@ def test_it_does_not_know_disturbances_to_come(drive):
     step = int(np.ceil(env.events.step_times[0] / env.options.period))
     assert np.array_equal(calm[: step + 1], disturbed[: step + 1])
     assert calm[step + 1] != disturbed[step + 1]
+
+
+RIVALS = [
+    make
+    for make in CONTROLLERS.values()
+    if not hasattr(make, "receive") and "rotation" in getattr(make, "kinds", ["rotation"])
+]
+
+bound_of = lru_cache(achievable_bound)
+
+
+@pytest.mark.campaign
+def test_no_controller_comes_closer_in_rotation(drive):
+    bound = bound_of("station", "rotation", 400)
+    for make in RIVALS:
+        got, _ = drive(make(), "rotation", 400)
+        assert all(bound[phase] <= 1.02 * got[phase] for phase in bound)
+
+
+@pytest.mark.campaign
+def test_no_controller_comes_closer_in_displacement(drive):
+    bound = bound_of("station", "displacement", 300)["displacement"]
+    for make in RIVALS:
+        assert bound <= 1.02 * drive(make(), "displacement", 300)[0]["displacement"]
+
+
+@pytest.mark.campaign
+def test_phase_three_is_limited_by_what_the_drive_cannot_push():
+    # More friction of the rotor brakes it sooner where the cable hangs loose.
+    model = load_model("station")
+    braked = model.replace({"rotor.damping_n_m_s": 7.64e-3})
+    free = bound_of("station", "rotation", 400)["III"]
+    assert achievable_bound(braked, "rotation", 400)["III"] > 3.0 * free > 0.0
+
+
+@pytest.mark.campaign
+def test_cascade_that_is_pushed_and_pulled_alike_has_no_floor():
+    bound = achievable_bound("cascade", "rotation", 300)
+    assert np.all(np.array(list(bound.values())) < 0.005)

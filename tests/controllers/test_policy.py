@@ -17,7 +17,7 @@ from controllers.policies.policy_file import PolicyError, save_policy_file
 from controllers.policy import Policy, ShippedPolicy, shipped_policies
 from controllers.registry import Controller
 from pma_gym.envs import PMAEnv
-from tests.controllers.drawn_policies import drawn_policy
+from tests.controllers.policies.test_network import drawn_policy
 
 KINDS = [
     (ObservationSpec("environment", 2, 3), ActionMapping("direct", 5.0)),

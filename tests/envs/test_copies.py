@@ -70,15 +70,6 @@ def test_a_copy_of_a_batch_goes_on_with_the_same_bits(batch_options, batch_cours
     envs.close()
 
 
-def test_a_batch_copied_where_episodes_have_just_ended_goes_on(batch, batch_course, same):
-    envs = batch(5)
-    envs.reset(seed=1)
-    while envs._waiting is None:
-        envs.step(np.full((5, 1), -0.8))
-    other = copy.deepcopy(envs)
-    assert same(batch_course(other), batch_course(envs))
-
-
 def test_pressures_of_each_are_copied(same):
     envs = PMAVectorEnv(3, model="serres2008", pressures_kpa=[200.0, [300.0, 400.0], "random"])
     envs.reset(seed=1)

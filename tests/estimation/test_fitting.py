@@ -216,15 +216,6 @@ def test_what_the_trials_do_not_determine_has_no_error(measured):
     assert np.diag(inverse(alike)).tolist() == [math.inf, math.inf, 0.5]
 
 
-def test_steps_stay_within_their_bounds():
-    curvature, gradient = np.array([[2.0, 1.0], [1.0, 2.0]]), np.array([-3.0, 3.0])
-    low, high = np.full(2, -9.0), np.full(2, 9.0)
-    np.testing.assert_allclose(least(gradient, curvature, 0.0, low, high), [3.0, -3.0])
-    bound = least(gradient, curvature, 0.0, low, np.array([1.0, 9.0]))
-    np.testing.assert_allclose(bound, [1.0, -2.0])
-    np.testing.assert_allclose(least(gradient, curvature, 0.0, 0.0 * low, 0.0 * high), 0.0)
-
-
 @pytest.mark.parametrize(
     ("path", "message"),
     [
