@@ -9,12 +9,11 @@ import stat
 import subprocess
 import sys
 import time
-from pathlib import Path
 
 import pytest
 
 from pma_gym import partials
-from pma_gym.files import OutputError, check_output, replace_file, replace_files
+from pma_gym.files import OutputError, check_output, replace_file
 from pma_gym.partials import begin_partial, clean_folder, end_partial, is_leftover
 
 posix = pytest.mark.skipif(os.name != "posix", reason="processes are asked for by signals")
@@ -167,20 +166,3 @@ def test_a_protected_file_is_refused(tmp_path):
     path.chmod(stat.S_IRUSR)
     with pytest.raises(OutputError, match="write-protected; name another, or allow writing"):
         check_output(path)
-
-
-def test_a_disk_that_fills_up_leaves_all_old_files_of_a_pair(tmp_path, monkeypatch):
-    pair = [tmp_path / "weights", tmp_path / "words"]
-    replace_files(dict.fromkeys(pair, b"old"))
-    write = Path.write_bytes
-
-    def full(path, content):
-        if "words" in path.name:
-            raise OSError(28, "No space left on device")
-        return write(path, content)
-
-    monkeypatch.setattr(Path, "write_bytes", full)
-    with pytest.raises(OSError, match="No space left"):
-        replace_files(dict.fromkeys(pair, b"new"))
-    assert [path.read_bytes() for path in pair] == [b"old", b"old"]
-    assert sorted(tmp_path.iterdir()) == pair

@@ -1,4 +1,7 @@
-"""Compiled libraries: calls, and what is kept on disk and found again."""
+"""Compiled libraries: calls, and what is kept on disk and found again.
+
+Arrays are read by compiled code only where they are laid out as it believes.
+"""
 
 import ast
 import ctypes
@@ -11,7 +14,7 @@ import pytest
 
 import pma_gym
 from pma_gym.codegen.cache import compile_cache
-from pma_gym.codegen.machine import native
+from pma_gym.codegen.machine import control, native
 from pma_gym.codegen.machine.control import DOUBLE, INTEGER, function, integer, loop, variable
 from pma_gym.codegen.machine.native import Library, compiled
 
@@ -189,3 +192,30 @@ def test_other_threads_run_during_a_call(folder):
     time.sleep(0.01)
     assert thread.is_alive()
     thread.join()
+
+
+@pytest.fixture
+def looked_at_anew():
+    control.are_known.cache_clear()
+    yield
+    control.are_known.cache_clear()
+
+
+def test_this_numpy_is_known():
+    assert control.are_known()
+
+
+@pytest.mark.parametrize(
+    ("member", "other"),
+    [
+        ("DIMENSIONS", "SIZES"),
+        ("SIZES", "STRIDES"),
+        ("STRIDES", "SIZES"),
+        ("DATA", "STRIDES"),
+        ("DTYPE", "DATA"),
+        ("TYPE", "DTYPE"),
+    ],
+)
+def test_a_member_that_lies_elsewhere_is_noticed(monkeypatch, looked_at_anew, member, other):
+    monkeypatch.setattr(control, member, getattr(control, other))
+    assert not control.are_known()

@@ -26,6 +26,9 @@ TRIALS = [
 ]
 
 
+SMOOTH = load_model("serres2008").replace(FRICTIONLESS)
+
+
 def voltages(station):
     controller = ImprovedFeedforward()
     controller.reset(lambda time: float(station.task.schedule.reference(time)), station)
@@ -42,9 +45,8 @@ def inverted(station):
 
 
 def test_while_held_it_asks_for_the_voltage_that_settles_there():
-    model = load_model("serres2008").replace(FRICTIONLESS)
-    volts = voltages(StationInfo(model, TASKS["rotation"], 350e3, 0.01))
-    plant = Plant(model)
+    volts = voltages(StationInfo(SMOOTH, TASKS["rotation"], 350e3, 0.01))
+    plant = Plant(SMOOTH)
     rest = plant.settle(volts[800], pressure=350e3)
     truth = plant.observe(rest.state[None, :], rest.zero_contraction)
     assert math.degrees(truth["rotation"][0]) == pytest.approx(90.0, abs=1e-3)
@@ -52,9 +54,8 @@ def test_while_held_it_asks_for_the_voltage_that_settles_there():
 
 def test_lag_is_compensated_by_the_damping_of_the_model():
     # Constant speed, no friction, no hysteresis: L = K y + B y'.
-    model = load_model("serres2008").replace(FRICTIONLESS)
-    where = StationInfo(model, TASKS["displacement"], 300e3, 0.01)
-    plant = Plant(model)
+    where = StationInfo(SMOOTH, TASKS["displacement"], 300e3, 0.01)
+    plant = Plant(SMOOTH)
     volts, middle = inverted(where), 5e-3 * 2.505
     static = plant.settle(3.0, pressure=300e3)
     truth = plant.observe(static.state[None, :], static.zero_contraction)
@@ -124,9 +125,8 @@ def test_it_follows_any_reference(station):
 
 def test_the_regulator_gets_the_voltage_that_holds(station):
     # In the hold of the isotonic task: settle there by the plant's own statics.
-    model = load_model("serres2008").replace(FRICTIONLESS)
-    where = StationInfo(model, EVERY_TASK["isotonic"], 300e3, 0.01)
-    controller, plant = ImprovedFeedforward(), Plant(model)
+    where = StationInfo(SMOOTH, EVERY_TASK["isotonic"], 300e3, 0.01)
+    controller, plant = ImprovedFeedforward(), Plant(SMOOTH)
     controller.reset(where.task.schedule.at, where)
     motor = (200.0 + 2.0) / 97.84
     rests = [

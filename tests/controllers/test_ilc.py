@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from controllers import ILC
+from controllers import ILC, PolicyWithILC
 from controllers.ilc import LearningGain, LiftedModel, Settings
 from controllers.models.nominal_motion import nominal_motion
 from pma_gym.envs import PMAEnv
@@ -145,13 +145,16 @@ def test_another_station_and_the_eleventh_trial_begin_anew(station, reading):
     assert not controller.learned.any()
 
 
-def test_a_trial_that_broke_off_is_learned_from_as_far_as_it_came(station, reading):
-    controller = ILC(Settings(3.0, 0.3, 0.3))
-    for steps in (100, 0):
+@pytest.mark.parametrize(
+    ("make", "kept"),
+    [(lambda: ILC(Settings(3.0, 0.3, 0.3)), "learned"), (PolicyWithILC, "moved")],
+    ids=["ilc", "ppo_ilc"],
+)
+def test_a_trial_that_broke_off_is_learned_from_as_far_as_it_came(make, kept, station, reading):
+    controller = make()
+    for steps in (100, 0, 0):
         controller.reset(lambda time: 5e-3 * time, station())
         for k in range(steps):
             controller.act(reading(extension=5e-3 * k * PERIOD - 1e-3), k * PERIOD)
-    assert controller.learned[:100].any()
-    assert not controller.learned[100:].any()
-    controller.reset(lambda time: 5e-3 * time, station())
-    assert controller.learned[:100].any()
+        learned = getattr(controller, kept)
+        assert learned[:100].any() == (steps == 0) and not learned[100:].any()

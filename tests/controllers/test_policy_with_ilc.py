@@ -138,12 +138,3 @@ def test_what_it_cannot_do_is_refused_and_changes_nothing(task, options, message
 def test_without_a_trial_there_is_nothing_to_act_on(reading):
     with pytest.raises(RuntimeError, match="ppo_ilc has no trial: call reset"):
         PolicyWithILC().act(reading(), 0.0)
-
-
-def test_of_a_trial_that_broke_off_the_rest_is_left_as_it_was(station, reading):
-    controller = PolicyWithILC()
-    for steps in (100, 0):
-        controller.reset(lambda time: 5e-3 * time, station())
-        for k in range(steps):
-            controller.act(reading(extension=5e-3 * k * PERIOD - 1e-3), k * PERIOD)
-    assert controller.moved[:100].all() and not controller.moved[100:].any()

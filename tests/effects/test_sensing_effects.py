@@ -13,7 +13,7 @@ import pytest
 from pma_gym.data.trial import Trial
 from pma_gym.effects import CATALOGUE
 from pma_gym.effects.sensors.sensor_delay import SENSOR_DELAYS
-from pma_gym.plant.equilibrium.solver import NoLoadEquilibria, equilibria_at
+from pma_gym.plant.equilibrium.solver import NoLoadEquilibria
 from pma_gym.plant.model import Model, ModelError, load_model
 from pma_gym.plant.plant import Plant
 
@@ -76,19 +76,6 @@ def test_a_wrong_sensor_reads_a_line_of_the_truth(name, quantity, gain, offset, 
             # Ten time constants of the slowest sensor after the last move.
             scale = np.abs(truth).max()
             assert logged.measurements[other][row] == pytest.approx(wrong[row], abs=1e-6 * scale)
-
-
-@pytest.mark.parametrize(("name", "quantity", "gain", "offset"), LINES)
-def test_many_wrong_sensors_begin_at_rest(name, quantity, gain, offset, station_with):
-    plant = station_with(name)
-    assert NoLoadEquilibria(plant)(np.array([300e3])) is None
-    voltages = np.full(2, plant.regulator_voltage(300e3))
-    states, zero = equilibria_at(plant, np.array([0.0, 2.0]), voltages)
-    for motor, state, x0 in zip((0.0, 2.0), states, zero, strict=True):
-        alone = plant.settle(motor, 300e3)
-        np.testing.assert_array_equal(alone.state, state)
-        rates = plant.derivative(state, motor, voltages[0], x0)
-        assert np.all(np.abs(rates) < 1e-5)
 
 
 def test_the_truth_knows_nothing_of_a_wrong_sensor(station_with, station):

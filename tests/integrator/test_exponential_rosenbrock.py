@@ -1,9 +1,6 @@
 """The exponential Rosenbrock method: its quotients, its order, and its stability.
 
-Small systems of linear equations of a known structure.
-
-Order of convergence of the integrator's steps, on a trial without a kink.
-
+The order is that of a smooth system without a closed form, and of a plant without a kink.
 Nobody can command the size of a plant's internal steps. Here the very arithmetic of a step, without
 its choice of size, is written as plain Python and integrated with sizes that are given.
 """
@@ -31,23 +28,18 @@ from pma_gym.integrator.exponential_rosenbrock import (
     STAGE_PHI,
     TERMS,
     Step,
-    solver,
     step,
 )
 from pma_gym.integrator.step_attempt import step_start
 from pma_gym.plant.model import load_model
 from pma_gym.plant.plant import Plant
 from pma_gym.plant.program import parameter_names
-from tests.plant import smooth
 
 SMOOTH = {
     "coulomb_friction.static_n": 0.0,
     "coulomb_friction.dynamic_n": 0.0,
     "damping.high_slope_n_s_per_mm_per_kpa": 0.0,
 }
-
-SIZES_S = (4e-3, 2e-3, 1e-3, 5e-4)
-"""Sizes of the steps that the order is read from (s)."""
 
 
 class FixedStep:
@@ -158,6 +150,45 @@ def orders(damping_n_s_per_mm: float, sizes: NDArray) -> tuple[NDArray, NDArray]
     return errors, np.log2(errors[:-1] / errors[1:])
 
 
+START = (2.0, 1.5)
+"""Prey and predators."""
+
+
+def predator_and_prey(step: Callable[..., Step]) -> Step:
+    """A step of prey and predators."""
+    graph = Graph()
+    x, y, size = (graph.input(name, CHANGING) for name in ("x", "y", "size"))
+    states = [State("x", x, x * (1.0 - y), 1.0), State("y", y, y * (x - 1.0), 1.0)]
+    return step(states, size, {}, {})
+
+
+def integrated(made: Step, duration: float, count: int) -> NDArray[np.float64]:
+    """Both after some steps from the start."""
+    state = list(START)
+    for _ in range(count):
+        given = {"x": state[0], "y": state[1], "size": duration / count}
+        state = [float(value) for value in evaluate(made.states, given)]
+    return np.array(state)
+
+
+def smooth_orders(made: Step) -> NDArray[np.float64]:
+    """Orders of convergence from 16 to 128 steps."""
+    exact = integrated(made, 2.0, 2048)
+    errors = [np.abs(integrated(made, 2.0, count) - exact).max() for count in (16, 32, 64, 128)]
+    return np.log2(np.divide(errors[:-1], errors[1:]))
+
+
+def in_one_step(made: Step) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Estimated and true errors of one step, ever half as long."""
+    estimates, truths = [], []
+    for size in 0.2 * 0.5 ** np.arange(5):
+        given = {"x": START[0], "y": START[1], "size": size}
+        estimates.append(max(abs(float(error)) for error in evaluate(made.errors, given)))
+        own = np.array([float(value) for value in evaluate(made.states, given)])
+        truths.append(np.abs(own - integrated(made, size, 64)).max())
+    return np.array(estimates), np.array(truths)
+
+
 POLE = float(GAMMA)
 
 
@@ -215,12 +246,12 @@ def test_the_stage_overshoots_nothing_that_is_fast():
 
 
 def test_order_four_on_predator_and_prey():
-    orders_seen = smooth.orders(smooth.predator_and_prey(step))
+    orders_seen = smooth_orders(predator_and_prey(step))
     assert np.all((3.7 < orders_seen) & (orders_seen < 4.5))
 
 
 def test_the_estimate_is_of_order_two_and_larger_than_the_error():
-    estimates, truths = smooth.in_one_step(smooth.predator_and_prey(step))
+    estimates, truths = in_one_step(predator_and_prey(step))
     # In one step: h^3 of what is not linear, h^5 of order 4.
     assert np.log2(estimates[:-1] / estimates[1:])[-2:] == pytest.approx(3.0, abs=0.1)
     assert np.log2(truths[:-1] / truths[1:])[-2:] == pytest.approx(5.0, abs=0.4)
@@ -228,11 +259,11 @@ def test_the_estimate_is_of_order_two_and_larger_than_the_error():
 
 
 def test_half_a_step_is_known_on_the_way():
-    made = smooth.predator_and_prey(step)
+    made = predator_and_prey(step)
     errors = []
     for size in (0.1, 0.05, 0.025):
         half = evaluate(made.visited[0], {"x": 2.0, "y": 1.5, "size": size})
-        truth = smooth.integrated(made, 0.5 * size, 64)
+        truth = integrated(made, 0.5 * size, 64)
         errors.append(np.abs(np.array([float(v) for v in half]) - truth).max())
     # Without what is not linear: h^3.
     assert np.log2(np.divide(errors[:-1], errors[1:])) == pytest.approx(3.0, abs=0.2)
@@ -283,25 +314,3 @@ def test_the_plants_estimate_is_of_order_two():
         estimates.append(abs(errors[plant.states.index("spin")]))
     orders_seen = np.log2(np.divide(estimates[:-1], estimates[1:]))
     assert np.all(2.8 < orders_seen)
-
-
-def test_elimination_solves_what_numpy_solves():
-    generator = np.random.default_rng(2)
-    for _ in range(20):
-        graph, count = Graph(), 7
-        part = float(10.0 ** generator.uniform(-7.0, 0.0))
-        numbers = 0.3 * generator.standard_normal((count, count)) / count / part
-        full = generator.uniform(size=(count, count)) < 0.4
-        jacobian = [
-            [graph.input(f"{i},{j}", CHANGING) if full[i, j] else None for j in range(count)]
-            for i in range(count)
-        ]
-        right = [graph.input(f"{i}", CHANGING) if i % 3 else None for i in range(count)]
-        solution = solver(jacobian, graph.input("part", CHANGING))(right)
-        values = generator.standard_normal(count)
-        given = {f"{i},{j}": numbers[i, j] for i in range(count) for j in range(count)}
-        given |= {f"{i}": values[i] for i in range(count)} | {"part": part}
-        matrix = np.eye(count) - part * np.where(full, numbers, 0.0)
-        expected = np.linalg.solve(matrix, np.where(np.arange(count) % 3 > 0, values, 0.0))
-        computed = [float(v) for v in evaluate(solution, given)]
-        np.testing.assert_allclose(computed, expected, rtol=1e-12, atol=1e-14)

@@ -1,20 +1,29 @@
 """The integrator on the plants: its errors, what it conserves, and what it approaches.
 
 Limits that the equations approach: energy, one mass, figure 16, and what inertia changes.
+
+States that only follow the others are stepped after them, with as high an order.
 """
 
 import math
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
+from pma_gym.codegen.graph import CHANGING, FIXED, Graph
+from pma_gym.codegen.text import evaluate
 from pma_gym.effects.muscle.stiffness import spring_stiffness
+from pma_gym.integrator.equations import State
+from pma_gym.integrator.step_attempt import cascaded_states, cascaded_step
 from pma_gym.plant.compiled_model import DEFAULT_TOLERANCE
 from pma_gym.plant.forms.plain import PlainPlant
 from pma_gym.plant.model import load_model
 from pma_gym.plant.plant import Plant
+from pma_gym.plant.program import system
 from pma_gym.plant.simulation import Run, simulate_all
 from pma_gym.plant.statics import Condition
 from tests.integrator.reference import (
@@ -40,6 +49,9 @@ FRICTIONLESS = {
     "rotor.damping_n_m_s": 0.0,
 }
 """`serres2008` without anything that loses energy."""
+
+
+SERRES = Plant("serres2008")
 
 
 def energy_drift(tolerance: float, duration: float = 1.0) -> float:
@@ -158,22 +170,20 @@ def _released(plant: Plant, pressure: float) -> Condition:
 
 
 def test_the_regulator_is_exact_to_the_tolerance():
-    plant = Plant("serres2008")
-    start = plant.settle(0.0, 200e3)
+    start = SERRES.settle(0.0, 200e3)
     when = np.array([0.0, 0.05, 0.1, 0.25, 0.9])
-    voltage = plant.regulator_voltage(400e3)
-    states, _ = plant.run(when, np.zeros(5), np.full(5, voltage), condition=start)
-    pressure = states[:, plant.states.index("pressure")]
+    voltage = SERRES.regulator_voltage(400e3)
+    states, _ = SERRES.run(when, np.zeros(5), np.full(5, voltage), condition=start)
+    pressure = states[:, SERRES.states.index("pressure")]
     np.testing.assert_allclose(pressure, 400e3 - 200e3 * np.exp(-when / 0.1), rtol=1e-7)
 
 
 def test_each_sensor_lags_by_the_analytic_first_order():
-    plant = Plant("serres2008")
-    start = plant.settle(0.0, 200e3)
-    lag = plant.states.index("lag_pressure_transducer")
+    start = SERRES.settle(0.0, 200e3)
+    lag = SERRES.states.index("lag_pressure_transducer")
     when = np.linspace(0.0, 0.2, 41)
-    states, _ = plant.run(
-        when, np.zeros(41), np.full(41, plant.regulator_voltage(300e3)), condition=start
+    states, _ = SERRES.run(
+        when, np.zeros(41), np.full(41, SERRES.regulator_voltage(300e3)), condition=start
     )
     slow, fast = 10.0, 2.0 * math.pi * 50.0
     response = 1.0 - (fast * np.exp(-slow * when) - slow * np.exp(-fast * when)) / (fast - slow)
@@ -196,17 +206,16 @@ def test_a_random_policy_against_scipy(model):
 def test_a_step_has_the_damping_of_the_way_that_it_goes(pressure):
     # serres2008 damps a muscle that shortens 1.8 times as much as one that is pulled, which this
     # one is in a moment: it still shortens by 0.1 um/s.
-    plant = Plant("serres2008")
-    rest, at = plant.settle(2.0, pressure), plant.states.index("velocity")
-    commands, zero = (3.0, plant.regulator_voltage(pressure)), rest.zero_contraction
+    rest, at = SERRES.settle(2.0, pressure), SERRES.states.index("velocity")
+    commands, zero = (3.0, SERRES.regulator_voltage(pressure)), rest.zero_contraction
     rest.state[at] = 1e-7
-    made = PlainPlant(plant).attempt(rest.state, commands, zero, 5e-4, 1e-3)
+    made = PlainPlant(SERRES).attempt(rest.state, commands, zero, 5e-4, 1e-3)
     assert made.accepted
 
     def rate(_, state):
-        return plant.derivative(state, *commands, zero)
+        return SERRES.derivative(state, *commands, zero)
 
-    truth = integrated(rate, rest.state, made.length, switches(plant, zero))
+    truth = integrated(rate, rest.state, made.length, switches(SERRES, zero))
     assert made.state[at] == pytest.approx(truth[at], rel=1e-4) and truth[at] < -5e-5
 
 
@@ -317,14 +326,86 @@ def test_run_steps_as_step_does():
 
 
 def test_commands_of_a_first_order_hold_pass_through_their_middle():
-    plant = Plant("serres2008")
-    start = plant.settle(1.0, 300e3)
-    regulator = plant.regulator_voltage(300e3)
-    ends, _ = plant.run(np.array([0.0, 0.4]), np.array([1.0, 5.0]), np.full(2, regulator))
-    middle, _ = plant.run(
+    start = SERRES.settle(1.0, 300e3)
+    regulator = SERRES.regulator_voltage(300e3)
+    ends, _ = SERRES.run(np.array([0.0, 0.4]), np.array([1.0, 5.0]), np.full(2, regulator))
+    middle, _ = SERRES.run(
         np.array([0.0, 0.1, 0.4]), np.array([1.0, 2.0, 5.0]), np.full(3, regulator)
     )
-    held, _ = plant.run(np.array([0.0, 0.4]), np.array([1.0, 5.0]), np.full(2, regulator), "zoh")
+    held, _ = SERRES.run(np.array([0.0, 0.4]), np.array([1.0, 5.0]), np.full(2, regulator), "zoh")
     np.testing.assert_allclose(ends[-1], middle[-1], rtol=1e-5, atol=1e-7)
     # The drive held at its first voltage moves nothing.
     np.testing.assert_allclose(held[-1], start.state, rtol=1e-9, atol=1e-7)
+
+
+FREQUENCY = 3.0
+
+
+def swing() -> Any:
+    """A swing x = cos(3 t), and y that follows it: y' = d (x - y)."""
+    graph = Graph()
+    x, v, y, end_x, end_v, size = (
+        graph.input(name, CHANGING) for name in ("x", "v", "y", "end_x", "end_v", "size")
+    )
+    d = graph.input("d", FIXED)
+    states = [
+        State("x", x, v, 1.0),
+        State("v", v, -(FREQUENCY**2) * x, 1.0),
+        State("y", y, d * x - d * y, 1.0),
+    ]
+    none: dict[str, list] = {"rate_independent_states": [], "events": [], "breakpoints": []}
+    equations: Any = SimpleNamespace(graph=graph, states=states, **none)
+    (cascaded,) = cascaded_states(equations)
+    assert cascaded.state.name == "y"
+    return cascaded_step(cascaded, size, {}, {x.id: end_x, v.id: end_v})
+
+
+def exact(time: float, decay: float, start: float) -> float:
+    """y of the swing: the particular solution, and what is left of the start."""
+    part = decay / (decay**2 + FREQUENCY**2)
+
+    def forced(t: float) -> float:
+        angle = FREQUENCY * t
+        return part * (decay * math.cos(angle) + FREQUENCY * math.sin(angle))
+
+    return forced(time) + (start - forced(0.0)) * math.exp(-decay * time)
+
+
+def stepped(value: Any, size: float, decay: float, start: float) -> float:
+    angle = FREQUENCY * size
+    given = {
+        **{"x": 1.0, "v": 0.0, "y": start, "size": size, "d": decay},
+        **{"end_x": math.cos(angle), "end_v": -FREQUENCY * math.sin(angle)},
+    }
+    return float(evaluate([value], given)[0])
+
+
+@pytest.mark.parametrize("decay", [0.5, 4.0, 20.0])
+def test_a_step_is_of_order_four(decay):
+    value = swing()
+    sizes = 0.2 * 0.5 ** np.arange(4) / max(1.0, 0.2 * decay)
+    errors = [abs(stepped(value, h, decay, 0.3) - exact(h, decay, 0.3)) for h in sizes]
+    orders_seen = np.log2(np.divide(errors[:-1], errors[1:]))
+    assert orders_seen[-1] == pytest.approx(5.0, abs=0.3)
+
+
+@pytest.mark.parametrize("decay", [1e2, 1e4, 1e8])
+def test_whatever_is_fast_stays_near_what_it_follows(decay):
+    value = swing()
+    for size in (1e-3, 1e-2):
+        after = stepped(value, size, decay, 1.2)
+        assert abs(after - math.cos(FREQUENCY * size)) <= 0.2 + 1e-6
+
+
+@pytest.mark.parametrize("model", ["station", "serres2008"])
+def test_lags_of_positions_and_pressures_follow_and_that_of_a_force_does_not(model):
+    equations = system(load_model(model), interpolation="foh").equations
+    names = [cascaded.state.name for cascaded in cascaded_states(equations)]
+    assert names == ["lag_lvdt", "lag_pressure_transducer", "lag_potentiometer"]
+
+
+def test_what_others_depend_on_does_not_follow():
+    equations = system(load_model("station"), interpolation="zoh").equations
+    names = {one.state.name for one in cascaded_states(equations)}
+    # The pressure decays towards a command as a lag does, but the muscle needs it.
+    assert not names & {"pressure", "contraction", "velocity", "angle", "spin"}

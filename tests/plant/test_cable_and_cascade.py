@@ -17,6 +17,12 @@ FINE = 1e-5
 """Time between rows (s), for impulses."""
 
 
+MAP = load_model("cascade").parameters["position_map"]
+
+
+SERRES = Plant("serres2008")
+
+
 @pytest.fixture(scope="module")
 def loose():
     """A station with 2 mm of slack."""
@@ -79,12 +85,11 @@ def test_slackening_and_tightening_again_keep_the_momentum(loose):
 
 
 def test_a_cable_cannot_push():
-    plant = Plant("serres2008")
-    start = plant.settle(0.0, 400e3)
+    start = SERRES.settle(0.0, 400e3)
     when = np.linspace(0.0, 1.0, 501)
-    lower = np.full(501, plant.regulator_voltage(300e3))
-    states, zero = plant.run(when, np.zeros(501), lower, condition=start)
-    truth = plant.observe(states, zero)
+    lower = np.full(501, SERRES.regulator_voltage(300e3))
+    states, zero = SERRES.run(when, np.zeros(501), lower, condition=start)
+    truth = SERRES.observe(states, zero)
     # The muscle lengthens by itself; the pulley has no reason to turn.
     assert truth["extension"][-1] > 0.01
     assert np.all(truth["load"] == 0.0)
@@ -93,14 +98,13 @@ def test_a_cable_cannot_push():
 
 
 def test_the_drive_cannot_unwind():
-    plant = Plant("serres2008")
-    start = plant.settle(0.0, 400e3)
+    start = SERRES.settle(0.0, 400e3)
     slack = Condition(start.state.copy(), start.zero_contraction + 0.02)
-    spin = plant.states.index("spin")
+    spin = SERRES.states.index("spin")
     slack.state[spin] = 1.0
     when = np.linspace(0.0, 0.5, 251)
-    regulator = np.full(251, plant.regulator_voltage(400e3))
-    states, _ = plant.run(when, np.zeros(251), regulator, condition=slack)
+    regulator = np.full(251, SERRES.regulator_voltage(400e3))
+    states, _ = SERRES.run(when, np.zeros(251), regulator, condition=slack)
     # V = 0 asks for -2 N on the line; the drive gives none, and only the bearing slows the rotor.
     expected = np.exp(-7.64e-4 / 2e-3 * when)
     np.testing.assert_allclose(states[:, spin], expected, rtol=1e-9)
@@ -149,31 +153,28 @@ def test_with_inertia_it_is_eq_10_and_the_muscle():
 
 
 def test_the_map_passes_through_table_18_and_is_linear_between_its_rows():
-    p = load_model("cascade").parameters["position_map"]
-    for row in range(len(p.pressure)):
+    for row in range(len(MAP.pressure)):
         for voltage in (1.0, 3.0):
-            parabola = (p.square[row] * voltage + p.linear[row]) * voltage + p.constant[row]
-            displacements = mapped_displacement(voltage, p.pressure[row], p)
+            parabola = (MAP.square[row] * voltage + MAP.linear[row]) * voltage + MAP.constant[row]
+            displacements = mapped_displacement(voltage, MAP.pressure[row], MAP)
             assert displacements == pytest.approx(max(0.0, parabola), rel=1e-12)
     printed = load_table("18")
-    assert set(np.asarray(printed["pressure_kpa"]) * 1e3) <= set(p.pressure)
-    ends = [mapped_displacement(2.0, pressure, p) for pressure in (500e3, 550e3)]
-    assert mapped_displacement(2.0, 525e3, p) == pytest.approx(sum(ends) / 2.0)
+    assert set(np.asarray(printed["pressure_kpa"]) * 1e3) <= set(MAP.pressure)
+    ends = [mapped_displacement(2.0, pressure, MAP) for pressure in (500e3, 550e3)]
+    assert mapped_displacement(2.0, 525e3, MAP) == pytest.approx(sum(ends) / 2.0)
 
 
 def test_the_map_gives_nothing_at_no_voltage_and_never_falls():
-    p = load_model("cascade").parameters["position_map"]
     for pressure in np.linspace(100e3, 600e3, 11):
-        along = [mapped_displacement(v, pressure, p) for v in np.linspace(0.0, 10.0, 101)]
+        along = [mapped_displacement(v, pressure, MAP) for v in np.linspace(0.0, 10.0, 101)]
         assert along[0] < 1e-3
         assert np.all(np.diff(along) >= 0.0)
 
 
 def test_a_straight_or_rising_map_has_no_peak():
-    p = load_model("cascade").parameters["position_map"]
     for square in (0.0, 1e-4):
-        bent = p._replace(square=tuple(square for _ in p.square))
-        expected = square * 81.0 + 9.0 * p.linear[0] + p.constant[0]
+        bent = MAP._replace(square=tuple(square for _ in MAP.square))
+        expected = square * 81.0 + 9.0 * MAP.linear[0] + MAP.constant[0]
         assert mapped_displacement(9.0, 100e3, bent) == pytest.approx(expected)
 
 

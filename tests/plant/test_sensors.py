@@ -13,6 +13,9 @@ STEPS = {"contraction": 0.050e-3, "load": 1.19, "pressure": 0.48e3, "rotation": 
 NOISE = {"contraction": 0.02e-3, "load": 0.5, "pressure": 0.3e3, "rotation": np.radians(0.1)}
 
 
+PLANT = Plant("serres2008")
+
+
 @pytest.fixture(scope="module")
 def slow():
     """A trial that passes slowly over many steps of the DAQ."""
@@ -32,21 +35,19 @@ def test_one_daq_step_is_what_the_station_has(slow):
 
 
 def test_noise_has_the_stated_standard_deviation(slow):
-    plant = Plant("serres2008")
-    measured, true = plant.simulate(slow).measurements, plant.simulate(slow).truth
+    measured, true = PLANT.simulate(slow).measurements, PLANT.simulate(slow).truth
     for name, sd in NOISE.items():
         # Quantising adds a twelfth of the square of its step.
         expected = np.hypot(sd, STEPS[name] / np.sqrt(12.0))
         assert np.std(measured[name] - true[name]) == pytest.approx(expected, rel=0.03)
-    levels = sensors.noise_levels(plant.model)
+    levels = sensors.noise_levels(PLANT.model)
     assert dict(zip(("contraction", "rotation", "load", "pressure"), levels, strict=True)) == (
         pytest.approx(NOISE)
     )
 
 
 def test_the_same_seed_gives_the_same_bits(slow):
-    plant = Plant("serres2008")
-    one, same, other = (plant.simulate(slow, seed=seed) for seed in (7, 7, 8))
+    one, same, other = (PLANT.simulate(slow, seed=seed) for seed in (7, 7, 8))
     for name in STEPS:
         np.testing.assert_array_equal(one.measurements[name], same.measurements[name])
         assert np.any(one.measurements[name] != other.measurements[name])
@@ -54,14 +55,13 @@ def test_the_same_seed_gives_the_same_bits(slow):
 
 
 def test_without_noise_the_readings_are_the_lagged_truth():
-    plant = Plant("serres2008")
     rows = 2001
     when = 1e-3 * np.arange(rows)
     motor = 3.0 + np.sin(2.0 * np.pi * when)
     trial = Trial(
         time=when, commands={"motor_voltage": motor, "regulator_voltage": np.full(rows, 6.0)}
     )
-    run = plant.simulate(trial, noise=False)
+    run = PLANT.simulate(trial, noise=False)
     for name, bandwidth in (("contraction", 100.0), ("load", 500.0), ("rotation", 200.0)):
         delayed = np.interp(when - 1.0 / (2.0 * np.pi * bandwidth), when, run.truth[name])
         span = np.ptp(run.truth[name])

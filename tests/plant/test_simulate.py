@@ -10,6 +10,8 @@ from pma_gym.data.trial import Trial
 from pma_gym.plant.model import load_model, shipped_models
 from pma_gym.plant.plant import Plant
 
+SERRES = Plant("serres2008")
+
 
 def trial(time, **commands):
     rows = len(time)
@@ -151,12 +153,11 @@ def test_serres2008_rests_where_its_three_elements_say():
 
 
 def test_what_no_muscle_balances_is_refused():
-    plant = Plant("serres2008")
     for message, act in (
-        (r"balances a load of 976\.4 N .*lower the first motor", lambda: plant.settle(10.0, 50e3)),
+        (r"balances a load of 976\.4 N .*lower the first motor", lambda: SERRES.settle(10.0, 50e3)),
         ("no contraction between -24 and 180 mm", lambda: Plant("schulte").settle(3.0, 0.0)),
-        ("what the regulator reaches with 0-10 V; got 900 kPa", lambda: plant.settle(0.0, 900e3)),
-        (r"settle\(\) needs a pressure", lambda: plant.settle(1.0)),
+        ("what the regulator reaches with 0-10 V; got 900 kPa", lambda: SERRES.settle(0.0, 900e3)),
+        (r"settle\(\) needs a pressure", lambda: SERRES.settle(1.0)),
     ):
         with pytest.raises(ValueError, match=message):
             act()
