@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 from pma_gym.codegen.derivative import derivatives
 from pma_gym.codegen.graph import CHANGING, FIXED, Graph
 from pma_gym.codegen.text import evaluate
-from pma_gym.codegen.trace import operation_counts, split, trace
-from pma_gym.effects.arithmetic import clip, positive, where
+from pma_gym.codegen.trace import operation_counts, trace
+from pma_gym.effects.arithmetic import clip, where
 
 
 @pytest.fixture
@@ -52,36 +52,6 @@ def test_constants_are_computed(graph):
     assert (two < 3.0).data is True
     assert graph.constant(-1, "integer").data == 2**64 - 1
     assert graph.constant(0.0) is not graph.constant(-0.0)
-
-
-def test_divisors_that_change_less_often_become_factors(graph, x, p):
-    quotient = x / p
-    assert quotient.operation == "multiply"
-    (reciprocal,) = split([quotient], FIXED)
-    assert (reciprocal.operation, reciprocal.level) == ("divide", FIXED)
-    assert (x + 1.0) / p is (x + 1.0) * reciprocal
-    assert (p / graph.input("q", FIXED)).operation == "divide"
-    assert (p / x).operation == "divide"
-    assert (1.0 / p) is reciprocal
-    quarter = x / 4.0
-    assert (quarter.operation, quarter.operands[1].data) == ("multiply", 0.25)
-    third = x / 3.0
-    assert third is x * (1.0 / 3.0)
-
-
-def test_positive_part_and_clip_take_two_operations_a_bound(graph, x):
-    part, held = trace(positive, x), trace(clip, x, 0.0, 1.0)
-    assert operation_counts([part])["choose"] == 2
-    assert operation_counts([part])["add"] == 0
-    assert operation_counts([held])["choose"] == 4
-    numbers = np.array([-np.inf, -1.0, -0.0, 0.0, 0.3, 1.0, 1.5, np.inf, np.nan])
-    computed = evaluate([part, held], {"x": numbers})
-    np.testing.assert_array_equal(computed[0], np.maximum(numbers, 0.0))
-    np.testing.assert_array_equal(computed[1], np.clip(numbers, 0.0, 1.0))
-    # A clip between bounds in the wrong order is left as it is.
-    odd = trace(clip, x, 1.0, 0.0)
-    expected = [clip(number, 1.0, 0.0) for number in numbers]
-    np.testing.assert_array_equal(evaluate([odd], {"x": numbers})[0], expected)
 
 
 OPERATIONS = ("add", "subtract", "multiply", "divide", "negative", "absolute", "root", "choose")

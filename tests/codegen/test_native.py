@@ -6,8 +6,6 @@ Arrays are read by compiled code only where they are laid out as it believes.
 import ast
 import ctypes
 import gc
-import threading
-import time
 from pathlib import Path
 
 import pytest
@@ -15,7 +13,6 @@ import pytest
 import pma_gym
 from pma_gym.codegen.cache import compile_cache
 from pma_gym.codegen.machine import control, native
-from pma_gym.codegen.machine.control import DOUBLE, INTEGER, function, integer, loop, variable
 from pma_gym.codegen.machine.native import Library, compiled
 
 TEXT = "define double @{name}(double %x) {{ %y = fmul double %x, {factor}\nret double %y }}"
@@ -162,36 +159,6 @@ def test_mistakes_are_named(folder):
     with pytest.raises(RuntimeError, match="expected"):
         Library("define nonsense")
     assert len(list(folder.glob("*.o"))) == 1
-
-
-def test_a_module_may_call_the_c_library(folder):
-    from llvmlite import ir
-
-    module = ir.Module()
-    builder, (x,) = function(module, "run", [("x", DOUBLE)], DOUBLE)
-    cosine = ir.Function(module, ir.FunctionType(DOUBLE, [DOUBLE]), "cos")
-    builder.ret(builder.call(cosine, [x]))
-    assert Library(module).function("run", [ctypes.c_double], ctypes.c_double)(0.0) == 1.0
-
-
-def test_other_threads_run_during_a_call(folder):
-    from llvmlite import ir
-
-    module = ir.Module()
-    builder, (count,) = function(module, "run", [("count", INTEGER)], INTEGER)
-    state = variable(builder, INTEGER, integer(1))
-    with loop(builder, count):
-        now = builder.load(state, typ=INTEGER)
-        shifted = builder.xor(now, builder.shl(now, integer(13)))
-        shifted = builder.xor(shifted, builder.lshr(shifted, integer(7)))
-        builder.store(builder.xor(shifted, builder.shl(shifted, integer(17))), state)
-    builder.ret(builder.load(state, typ=INTEGER))
-    run = Library(module).function("run", [ctypes.c_int64], ctypes.c_int64)
-    thread = threading.Thread(target=run, args=(10**8,))
-    thread.start()
-    time.sleep(0.01)
-    assert thread.is_alive()
-    thread.join()
 
 
 @pytest.fixture

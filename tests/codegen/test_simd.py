@@ -12,7 +12,6 @@ from llvmlite import ir
 
 from pma_gym.codegen.graph import CHANGING, Graph
 from pma_gym.codegen.machine.control import (
-    DOUBLE,
     INTEGER,
     function,
     loop,
@@ -63,17 +62,6 @@ def test_an_input_that_is_not_given_is_named():
     builder, _ = function(ir.Module(), "run", [])
     with pytest.raises(KeyError, match="input x is not given"):
         SimdEmitter().emit(builder, [graph.input("x", CHANGING) + 1.0], {})
-
-
-def test_what_is_known_is_not_computed_again():
-    graph = Graph()
-    x = graph.input("x", CHANGING)
-    root = (x * x + 1.0) ** 0.5
-    module = ir.Module()
-    builder, (given,) = function(module, "run", [("given", DOUBLE)], DOUBLE)
-    operands = SimdEmitter().emit(builder, [root * 2.0], {root.id: given})
-    builder.ret(operands[(root * 2.0).id])
-    assert "sqrt" not in str(module)
 
 
 def test_strict_code_rounds_twice_and_fused_code_once(run_columns):

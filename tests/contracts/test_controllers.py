@@ -2,7 +2,9 @@
 
 import copy
 import math
+import pickle
 
+import numpy as np
 import pytest
 
 from controllers import CONTROLLERS, Controller, adrc, ilc, lqg, sliding_mode
@@ -79,3 +81,23 @@ def test_defaults_lie_within_the_bounds_of_a_search(module):
     for settings in module.DEFAULTS.values():
         for name, (low, high) in module.BOUNDS.items():
             assert low <= getattr(settings, name) <= high
+
+
+def test_a_copy_of_a_program_that_met_its_limits_goes_on_with_the_same_bits():
+    from controllers.design.quadratic_program import BoundedProgram
+
+    program, generator = BoundedProgram(3), np.random.default_rng(5)
+
+    def problem():
+        root = generator.normal(size=(3, 3))
+        low = np.full(3, -0.1)
+        return root @ root.T + np.eye(3), 5.0 * generator.normal(size=3), low, -low
+
+    for _ in range(20):
+        program.solve(*problem())
+    assert program.limited == 20
+    copies = [copy.deepcopy(program), pickle.loads(pickle.dumps(program))]
+    for asked in [problem() for _ in range(20)]:
+        answer = program.solve(*asked)
+        assert all(np.array_equal(copied.solve(*asked), answer) for copied in copies)
+    assert copies[0].limited == 40

@@ -152,23 +152,18 @@ def printed(task, pressure_kpa):
     raise AssertionError((task, pressure_kpa))
 
 
-@pytest.mark.parametrize(("task", "pressure"), PRINTED)
-def test_replay_is_the_printed_table_at_its_samples(task, pressure, station):
-    replay, table = SerresReplay(), printed(task, pressure)
-    where = station(task, pressure)
-    replay.reset(task_reference(where), where)
-    for time, volts in zip(table["time_s"], table["motor_voltage_v"], strict=True):
-        assert replay.voltage(time) == volts
-
-
-@pytest.mark.parametrize(("task", "pressure"), PRINTED)
-def test_live_feedforward_gives_the_printed_voltages(task, pressure, station):
-    live, table = SerresFeedforward(), printed(task, pressure)
-    where = station(task, pressure)
-    live.reset(task_reference(where), where)
-    computed = [live.voltage(time) for time in table["time_s"]]
+@pytest.mark.parametrize(
     # Half a unit of the last of four digits; tests of the profile itself hold every digit.
-    assert computed == pytest.approx(table["motor_voltage_v"], abs=5.1e-5)
+    ("kind", "off"),
+    [(SerresReplay, 0.0), (SerresFeedforward, 5.1e-5)],
+)
+@pytest.mark.parametrize(("task", "pressure"), PRINTED)
+def test_voltages_are_those_of_the_printed_table(task, pressure, kind, off, station):
+    controller, table = kind(), printed(task, pressure)
+    where = station(task, pressure)
+    controller.reset(task_reference(where), where)
+    computed = [controller.voltage(time) for time in table["time_s"]]
+    assert computed == pytest.approx(table["motor_voltage_v"], rel=0.0, abs=off)
 
 
 def test_samples_are_joined_or_held(station):
@@ -214,25 +209,28 @@ def test_live_feedforward_covers_pressures_between(station):
     assert np.all(between >= np.minimum(low, high) - 0.05)
 
 
-def test_unreachable_reference_names_the_range(station):
-    where = station("displacement", 150)
-    expected = rf"at 150 kPa: displacement must lie in 0-{reachable_mm(150):.4g} mm"
-    with pytest.raises(ValueError, match=expected):
-        SerresFeedforward().reset(lambda time: 6e-3 * time, where)
+DEGREES = math.degrees(1e-3 * reachable_mm(200) / PROFILE_RADIUS)
+RANGE = "pressure must lie in 150-575 kPa.*got 140"
 
 
-def test_unreachable_rotation_names_the_range_in_degrees(station):
-    where = station("rotation", 200)
-    degrees = math.degrees(1e-3 * reachable_mm(200) / PROFILE_RADIUS)
-    with pytest.raises(ValueError, match=rf"rotation must lie in 0-{degrees:.4g} deg"):
-        SerresFeedforward().reset(task_reference(where), where)
-
-
-def test_pressure_outside_the_map_is_refused(station):
-    for task in ("displacement", "rotation"):
-        where = station(task, 140)
-        with pytest.raises(ValueError, match=r"pressure must lie in 150-575 kPa.*got 140"):
-            SerresFeedforward().reset(task_reference(where), where)
+@pytest.mark.parametrize(
+    ("task", "pressure", "share", "message"),
+    [
+        (
+            "displacement",
+            150,
+            1.2,
+            f"150 kPa: .* must lie in 0-{reachable_mm(150):.4g} mm",
+        ),
+        ("rotation", 200, 1.0, f"rotation must lie in 0-{DEGREES:.4g} deg"),
+        ("displacement", 140, 1.0, RANGE),
+        ("rotation", 140, 1.0, RANGE),
+    ],
+)
+def test_what_the_map_does_not_reach_is_refused(task, pressure, share, message, station):
+    where = station(task, pressure)
+    with pytest.raises(ValueError, match=message):
+        SerresFeedforward().reset(lambda time: share * task_reference(where)(time), where)
 
 
 def test_rotation_aims_at_the_dissertation_s_pulley():

@@ -13,10 +13,10 @@ from controllers import LQG, PID, ImprovedFeedforward, PreviewMPC
 from controllers.lqg import Settings, regulator, steady_gain
 from controllers.models.local_model import LocalModel
 from controllers.models.nominal_motion import nominal_motion
-from controllers.models.operating_range import free_rotor
+from controllers.models.operating_range import Cable, free_rotor
 from controllers.observers.deviation_filter import SHARE, SHARE_TIME_S, Unknowns, with_disturbance
 from controllers.observers.pressure_filter import PressureFilter
-from pma_gym.envs import PMAEnv, StationInfo
+from pma_gym.envs import Measurement, PMAEnv, StationInfo
 from pma_gym.plant.model import load_model
 from pma_gym.tasks import EVERY_TASK, RANDOMISATIONS, varied_station
 from tests.controllers.conftest import by_phase, trial
@@ -111,6 +111,28 @@ def test_free_rotor_is_exact_under_held_voltage():
     times = 0.01 * np.arange(1, 51)
     exact = 0.1 * push / rate * (times + np.expm1(-rate * times) / rate)
     assert computed == pytest.approx(exact, rel=1e-9)
+
+
+def readings(where, ways_mm, loads_n, period=0.01):
+    radius = where.model.parameters["rotor"].radius
+    for k, (way, load) in enumerate(zip(ways_mm, loads_n, strict=True)):
+        yield Measurement(k * period, 0.0, 1e-3 * way / radius, load + 7.0, 300e3)
+
+
+def test_a_cable_is_loose_at_the_start_and_where_it_is_slack_for_long():
+    # The load cell is 7 N off throughout; the slack is 1.18 mm.
+    where = station_of("rotation")
+    cable, seen = Cable(where), []
+    travels = [0.0] * 3 + [1.2] * 10 + [0.5, 1.2] + [1.2] * 5 + [0.5] * 8
+    loads = [0.0] * 3 + [20.0] * 10 + [0.0, 20.0] + [20.0] * 5 + [0.0] * 8
+    for reading in readings(where, travels, loads):
+        cable.update(reading)
+        seen.append((cable.loose, cable.settling))
+    assert seen[2] == (True, True)
+    assert seen[4] == (False, True) and seen[6] == (False, False)
+    assert seen[13] == (False, True)  # a bounce
+    assert seen[19] == (False, False)
+    assert seen[-1] == (True, True)
 
 
 def test_pressure_filter_foresees_a_step_of_the_regulator():

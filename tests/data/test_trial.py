@@ -65,12 +65,6 @@ def test_a_trial_travels_between_processes(duplicate):
     assert not made.time.flags.writeable
 
 
-def test_replacing_a_part_keeps_the_rest():
-    made = dataclasses.replace(trial(), measurements={"load": [1.0, 2.0, 3.0]})
-    assert_array_equal(made.commands["motor_voltage"], VOLTS["motor_voltage"])
-    assert set(made.measurements) == {"load"}
-
-
 @pytest.mark.parametrize(
     ("changes", "message"),
     [

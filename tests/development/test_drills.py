@@ -92,48 +92,39 @@ def test_a_controller_is_three_files(tmp_path):
     assert "3 passed" in after.stdout
 
 
-@pytest.mark.campaign
-def test_an_effect_is_three_files(tmp_path):
-    copy = copied(
-        tmp_path, "pma_gym", "pyproject.toml", "tests/effects/conftest.py",
-        "tests/effects/test_catalogue.py",
-    )  # fmt: skip
-    assert len(set(follow("add-an-effect.md", copy))) == 3
-    done = run_pytest(copy, "tests/effects", "-k", "guide_lubricant or lubricant_force")
+CATALOGUE = ("tests/effects/conftest.py", "tests/effects/test_catalogue.py")
+
+
+@pytest.mark.parametrize(
+    ("page", "files", "copies", "asked", "least"),
+    [
+        # The page's own tests, and the contracts that loop over every effect or task.
+        pytest.param(
+            *("add-an-effect.md", 3, CATALOGUE),
+            *(["tests/effects", "-k", "guide_lubricant or lubricant_force"], 8),
+            marks=pytest.mark.campaign,
+        ),
+        (
+            *("add-a-task.md", 3, ["tests/test_tasks.py"]),
+            *(["tests/test_tasks.py", "tests/tasks", "-k", "smooth_step"], 4),
+        ),
+        pytest.param(
+            *("add-a-rig.md", 3, (), ["tests/plant/test_vertical_slide.py"], 3),
+            marks=pytest.mark.campaign,
+        ),
+        pytest.param(
+            *("add-a-sensor.md", 4, CATALOGUE),
+            *(["tests/plant", "tests/effects", "-k", "torque_flange"], 6),
+            marks=pytest.mark.campaign,
+        ),
+    ],
+)
+def test_what_a_page_adds_is_three_or_four_files(page, files, copies, asked, least, tmp_path):
+    copy = copied(tmp_path, "pma_gym", "pyproject.toml", *copies)
+    assert len(set(follow(page, copy))) == files
+    done = run_pytest(copy, *asked)
     assert done.returncode == 0, done.stdout + done.stderr
-    # The page's own test, and more than as many contracts of the catalogue.
-    assert int(done.stdout.split(" passed")[0].split()[-1]) >= 8
-
-
-def test_a_task_is_three_files(tmp_path):
-    copy = copied(tmp_path, "pma_gym", "pyproject.toml", "tests/test_tasks.py")
-    assert len(set(follow("add-a-task.md", copy))) == 3
-    done = run_pytest(copy, "tests/test_tasks.py", "tests/tasks", "-k", "smooth_step")
-    assert done.returncode == 0, done.stdout + done.stderr
-    # The page's own test, and those that loop over every task.
-    assert int(done.stdout.split(" passed")[0].split()[-1]) >= 4
-
-
-@pytest.mark.campaign
-def test_a_rig_is_three_files(tmp_path):
-    copy = copied(tmp_path, "pma_gym", "pyproject.toml")
-    assert len(set(follow("add-a-rig.md", copy))) == 3
-    done = run_pytest(copy, "tests/plant/test_vertical_slide.py")
-    assert done.returncode == 0, done.stdout + done.stderr
-    assert "3 passed" in done.stdout
-
-
-@pytest.mark.campaign
-def test_a_sensor_is_four_files(tmp_path):
-    copy = copied(
-        tmp_path, "pma_gym", "pyproject.toml", "tests/effects/conftest.py",
-        "tests/effects/test_catalogue.py",
-    )  # fmt: skip
-    assert len(set(follow("add-a-sensor.md", copy))) == 4
-    done = run_pytest(copy, "tests/plant", "tests/effects", "-k", "torque_flange")
-    assert done.returncode == 0, done.stdout + done.stderr
-    # The page's own two tests, and contracts of the catalogue.
-    assert int(done.stdout.split(" passed")[0].split()[-1]) >= 6
+    assert int(done.stdout.split(" passed")[0].split()[-1]) >= least
 
 
 PAGES = sorted((ROOT / "docs" / "development").glob("*.md"))

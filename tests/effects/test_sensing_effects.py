@@ -39,13 +39,6 @@ def test_a_large_step_rises_straight_and_a_small_one_as_ever(station_with, stati
     assert np.abs(rising - pressures(station, 300e3, dense)).max() > 50e3
 
 
-def test_a_limited_regulator_rests_where_it_is_told(station_with):
-    plant = station_with("regulator_rate_limit", limit_kpa_per_s=10.0)
-    for pressure in (150e3, 300e3, 575e3):
-        rest = plant.settle(1.0, pressure)
-        assert rest.state[plant.states.index("pressure")] == pytest.approx(pressure, rel=1e-12)
-
-
 LINES = [
     ("lvdt_error", "contraction", 0.01, 0.5e-3),
     ("load_cell_error", "load", 0.02, 5.0),

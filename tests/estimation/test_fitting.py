@@ -125,12 +125,15 @@ def test_the_jacobian_is_that_of_a_tight_tolerance(measured, central):
     assert np.all(np.sum(slopes * truth, axis=1) / size / np.linalg.norm(slopes, axis=1) > 0.9998)
 
 
-def test_sums_are_those_of_residuals_and_their_derivatives(measured):
+@pytest.mark.parametrize("central", [False, True])
+def test_sums_are_those_of_residuals_and_their_derivatives(measured, central):
     some = Residuals(OFF, measured[:3], FREE)
     values, moves = some.start, 1e-3 * some.start
-    sums = some.sums(values, moves)
+    sums = some.sums(values, moves, central)
     r = np.concatenate([residuals.ravel() for residuals in some.each(values)])
-    j = np.concatenate([slopes.reshape(4, -1) for slopes in some.jacobian(values, moves)], axis=1)
+    j = np.concatenate(
+        [slopes.reshape(4, -1) for slopes in some.jacobian(values, moves, central)], axis=1
+    )
     assert sums.chi_square == pytest.approx(r @ r, rel=1e-12)
     np.testing.assert_allclose(sums.gradient, j @ r, rtol=1e-9)
     np.testing.assert_allclose(sums.curvature, j @ j.T, rtol=1e-9)

@@ -36,7 +36,7 @@ def bare(intercept=0.0, viscous=0.001):
 
 
 def pushed(plant, when, force):
-    """Contraction, velocity, friction (N) under a force (N) over time, from rest; cable far off."""
+    """Contraction, velocity, friction (N) and memory under a force (N) over time; cable far off."""
     state = np.zeros(len(plant.states))
     state[plant.states.index("pressure")] = 100e3 * force[0]
     regulator = (100.0 * force + 20.4) / 59.9
@@ -45,14 +45,14 @@ def pushed(plant, when, force):
     names = ("contraction", "velocity", "memory_coulomb_friction")
     x, velocity, memory = (states[:, plant.states.index(name)] for name in names)
     p = plant.model.parameters["coulomb_friction"]
-    return x, velocity, -friction_force(velocity, memory, p)
+    return x, velocity, -friction_force(velocity, memory, p), memory
 
 
 def test_below_the_static_force_it_holds_for_a_minute():
     plant = bare(viscous=1.0)
     when = np.linspace(0.0, 60.0, 601)
     for force in (0.5, 1.2, 1.8):
-        x, _, friction = pushed(plant, when, np.full(601, force))
+        x, _, friction, _ = pushed(plant, when, np.full(601, force))
         assert friction[-1] == pytest.approx(force, rel=1e-6)
         assert abs(x[-1] - x[50]) < 1e-10
         assert 0.0 < x[-1] < 12e-6
@@ -61,11 +61,11 @@ def test_below_the_static_force_it_holds_for_a_minute():
 def test_a_small_swing_of_the_load_does_not_walk_it_away():
     plant = bare(viscous=1.0)
     when = np.linspace(0.0, 60.0, 6001)
-    x, _, _ = pushed(plant, when, 0.9 + 0.4 * np.sin(2.0 * np.pi * when))
+    x, *_ = pushed(plant, when, 0.9 + 0.4 * np.sin(2.0 * np.pi * when))
     assert np.abs(x[5900:6001] - x[900:1001]).max() < 1e-10
     assert np.ptp(x[5900:]) < 5e-6
     # Beyond the elastic 70 % of the static force each swing takes a little, under 1 um.
-    x, _, _ = pushed(plant, when, 1.5 + 0.2 * np.sin(2.0 * np.pi * when))
+    x, *_ = pushed(plant, when, 1.5 + 0.2 * np.sin(2.0 * np.pi * when))
     assert 0.0 < x[6000] - x[1000] < 50e-6
 
 
@@ -73,7 +73,7 @@ def test_under_seven_tenths_of_the_static_force_it_is_a_spring():
     when = np.linspace(0.0, 2.0, 2001)
     force = 0.69 * STATIC * np.sin(np.pi * when)
     # Pushed by a constant, so that the pressure stays above zero.
-    x, velocity, friction = pushed(bare(intercept=-3.0, viscous=0.1), when, force + 3.0)
+    x, velocity, friction, _ = pushed(bare(intercept=-3.0, viscous=0.1), when, force + 3.0)
     spring = STATIC / PRESLIDING * x
     creep = np.abs(velocity).max() / 5e-3
     # But for the Stribeck share of the creeping speed, which is squared.
@@ -87,7 +87,7 @@ def test_under_seven_tenths_of_the_static_force_it_is_a_spring():
 def test_it_breaks_away_at_the_static_force():
     when = np.linspace(0.0, 2.0, 2001)
     force = 1.2 * when
-    x, _, friction = pushed(bare(viscous=0.1), when, force)
+    x, _, friction, _ = pushed(bare(viscous=0.1), when, force)
     # The bristles give way over 1.3 presliding distances.
     gone = force[int(np.argmax(x > 1.3 * PRESLIDING))]
     assert gone == pytest.approx(STATIC, rel=0.01)
@@ -100,7 +100,7 @@ def test_while_sliding_it_is_the_dynamic_force():
     # 100 mm/s against a viscous 0.01 N s/mm: 1 N of it, the rest is friction.
     plant = bare(viscous=0.01)
     when = np.linspace(0.0, 1.0, 1001)
-    _, velocity, friction = pushed(plant, when, np.full(1001, 2.5))
+    _, velocity, friction, _ = pushed(plant, when, np.full(1001, 2.5))
     speed = velocity[-1]
     level = DYNAMIC + (STATIC - DYNAMIC) / (1.0 + (speed / 5e-3) ** 2)
     assert speed == pytest.approx((2.5 - level) / 10.0, rel=1e-3)
@@ -120,7 +120,7 @@ def test_it_stops_what_slides_without_pushing_it_back():
     plant = bare()
     when = np.linspace(0.0, 2.0, 2001)
     force = np.where(when < 0.1, 2.5, 0.0)
-    x, velocity, friction = pushed(plant, when, force)
+    x, velocity, friction, _ = pushed(plant, when, force)
     assert velocity.max() > 0.05
     # The bristle gives back its few micrometres, and that is all.
     assert x.max() - x[-1] < 12e-6
@@ -132,13 +132,7 @@ def test_on_the_way_back_it_follows_the_laws_path():
     plant = bare(intercept=-3.0, viscous=0.05)
     when = np.linspace(0.0, 1.0, 20001)
     force = 3.0 + 2.5 * np.sin(9.0 * when) + 0.9 * np.sin(70.0 * when)
-    state = np.zeros(len(plant.states))
-    state[plant.states.index("pressure")] = 100e3 * force[0]
-    start = Condition(state, zero_contraction=1e3)
-    regulator = (100.0 * force + 20.4) / 59.9
-    states, _ = plant.run(when, np.zeros_like(when), regulator, condition=start)
-    names = ("contraction", "velocity", "memory_coulomb_friction")
-    x, velocity, z = (states[:, plant.states.index(name)] for name in names)
+    x, velocity, _, z = pushed(plant, when, force)
     turned = np.flatnonzero(np.diff(np.sign(velocity)) != 0)
     assert len(turned) > 10
     checked = 0

@@ -10,10 +10,10 @@ import pytest
 
 from controllers.models.voltage import nominal_offset
 from controllers.policies.adapter import ActionMapping, PolicyAdapter
-from controllers.policies.observation_spec import ObservationSpec, delayed_rows
+from controllers.policies.observation_spec import ObservationSpec
 from pma_gym.envs import Measurement, PMAEnv, StationInfo
 from pma_gym.plant.model import load_model
-from pma_gym.tasks import TASKS, named_task
+from pma_gym.tasks import named_task
 from pma_gym.units import SI_FACTORS
 
 RATE = {"control_rate_hz": 20.0, "pressure_kpa": 300.0}
@@ -250,13 +250,3 @@ def test_a_prescribed_moment_is_compared_at_the_angle(angle, prescribed):
     # 4 % of the greatest moment, 9 N m, is 0.36 N m.
     assert observation["prescribed less measured moment"] == pytest.approx(-2.0, abs=1e-5)
     assert observation["measured rotation"] == pytest.approx(angle / 90.0)
-
-
-def test_units_stand_beside_the_names():
-    units = dict(delayed_rows(named_task("isokinetic_exercise")))
-    assert units["reference less measured position"] == "3.6 deg"
-    assert dict(delayed_rows(TASKS["rotation"]))["reference less measured position"] == "0.9 deg"
-    assert (
-        dict(delayed_rows(named_task("isotonic_exercise")))["prescribed less measured moment"]
-        == "0.32 N m"
-    )
