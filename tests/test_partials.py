@@ -141,14 +141,6 @@ def test_a_name_as_long_as_the_file_system_allows_can_be_written(tmp_path):
     assert path.read_bytes() == b"1" and len(names(tmp_path)) == 1
 
 
-def test_a_file_that_can_be_written_passes_and_nothing_is_left(tmp_path):
-    check_output(tmp_path / "new.csv")
-    assert not list(tmp_path.iterdir())
-    replace_file(tmp_path / "new.csv", b"old")
-    check_output(tmp_path / "new.csv")
-    assert (tmp_path / "new.csv").read_bytes() == b"old"
-
-
 def test_a_folder_that_allows_no_files_is_refused(tmp_path, monkeypatch):
     def denied(dir):
         raise PermissionError(13, "Permission denied")

@@ -57,13 +57,6 @@ def test_every_kind_is_kept_and_every_operation_written(width, paired, run_colum
         np.testing.assert_array_equal(column, expected)
 
 
-def test_an_input_that_is_not_given_is_named():
-    graph = Graph()
-    builder, _ = function(ir.Module(), "run", [])
-    with pytest.raises(KeyError, match="input x is not given"):
-        SimdEmitter().emit(builder, [graph.input("x", CHANGING) + 1.0], {})
-
-
 def test_strict_code_rounds_twice_and_fused_code_once(run_columns):
     graph = Graph()
     a, b, c = (graph.input(name, CHANGING) for name in "abc")

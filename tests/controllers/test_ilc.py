@@ -91,6 +91,14 @@ def test_a_doubtful_model_goes_on_learning_first():
     assert gains[1, 2] > gains[0, 2]
 
 
+def test_what_comes_and_goes_is_averaged():
+    """Trials that each leave as much as the first are noise: soon little is learned of one."""
+    gain = LearningGain(0.3)
+    got = [gain.next(1e4) for _ in range(9)]
+    assert got[0] > 0.9
+    assert got[-1] < 0.2
+
+
 def trials(env, nominal=None, count=10):
     """RMSE (mm) by trial, each with noise of its own."""
     controller = ILC(Settings(3.0, 0.3, 0.3))

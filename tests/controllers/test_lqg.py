@@ -151,6 +151,17 @@ def test_pressure_filter_foresees_a_step_of_the_regulator():
         filter_.advance(300e3)
 
 
+def test_pressure_filter_keeps_noise_and_a_wrong_zero_away():
+    where, generator = station_of(), np.random.default_rng(0)
+    filter_, said = PressureFilter(where), []
+    for noise in generator.normal(0.0, 330.0, 500).tolist():
+        filter_.update(303e3 + noise)
+        said.append(filter_.pressure)
+        filter_.advance(300e3)
+    assert np.std(said) < 150.0
+    assert np.abs(np.array(said) - 300e3).max() < 500.0
+
+
 @pytest.mark.parametrize(
     ("task", "late", "most"),
     [

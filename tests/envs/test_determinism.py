@@ -115,6 +115,17 @@ def test_drawn_parameters_lie_within_their_bounds_and_vary(make, uncertain, rand
     assert 2.7 / share <= min(slopes) < 2.85 < 2.95 < max(slopes) <= 3.1 * share
 
 
+def test_intervals_are_met_in_all_their_width(make, uncertain):
+    env = make(model=uncertain, randomisation="intervals")
+    values = []
+    for _ in range(200):
+        env.reset(seed=None if values else 0)
+        values.append(env.plant.model.values_in_files("damping")["contracting_n_s_per_mm"])
+    assert 2.0 <= min(values) < 2.1 and 3.9 < max(values) <= 4.0
+    # A uniform draw's mean: 3 with a standard error of 0.04.
+    assert np.mean(values) == pytest.approx(3.0, abs=0.2)
+
+
 @pytest.mark.parametrize(
     ("task", "randomisation"), [("displacement", "intervals"), ("rotation", "varied")]
 )

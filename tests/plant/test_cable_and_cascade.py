@@ -198,11 +198,3 @@ def test_a_pressure_step_takes_the_muscles_time_constant():
     assert np.interp(1.0 - np.exp(-1.0), share, when) == pytest.approx(tau, abs=0.5e-3)
     when, share = contraction_after_a_pressure_step("cascade")
     assert np.interp(1.0 - np.exp(-1.0), share, when) == pytest.approx(0.215, abs=0.01)
-
-
-def test_at_constant_pressure_the_free_contraction_stands_still():
-    plant, _, extension = stepped("cascade", 400e3, 1.0, 4.0)
-    rest = plant.settle(4.0, 400e3)
-    state = rest.state[plant.states.index("free_contraction")]
-    assert state == pytest.approx((2.91 * 400.0 + 44.6) / (17.0 + 0.0179 * 400.0) * 1e-3)
-    assert np.ptp(extension) > 0.01
