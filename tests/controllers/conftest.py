@@ -15,8 +15,8 @@ def trial(controller: Controller, env: PMAEnv, seed=1, nominal=None) -> dict:
     env.reset(seed=seed)
     if isinstance(controller, Oracle):
         controller.receive(env)
-    told = env.station if nominal is None else replace(env.station, model=nominal)
-    controller.reset(env.reference, told)
+    information = env.station if nominal is None else replace(env.station, model=nominal)
+    controller.reset(env.reference, information)
     ended, info = False, {}
     while not ended:
         voltage = controller.act(env.measurement, env.time)

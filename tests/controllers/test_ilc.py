@@ -116,7 +116,7 @@ def drawn(task, pressure_kpa, seed, **loop):
 
 @pytest.mark.parametrize("loop", [{}, {"control_rate_hz": 50.0, "action_delay_s": 0.02}])
 def test_noise_floor_is_reached_in_ten_trials(loop):
-    """As well as the same controller that was told the true model, within a fifth."""
+    """As well as the same controller that was nominal the true model, within a fifth."""
     env, nominal = drawn("displacement", 150, seed=300, **loop)
     learned = trials(env, nominal)
     errors = trials(env)
@@ -174,15 +174,15 @@ READING = (1.0, 2.0, 3.0, 4.0)
 
 
 def weaker():
-    """The station with a drive that pulls a tenth less than controllers are told."""
+    """The station with a drive that pulls a tenth less than controllers are nominal."""
     nominal = load_model("station")
     return nominal.replace({"drive.gain_n_per_v": 0.9 * nominal.parameters["drive"].gain})
 
 
-def practised(controller, seeds, env):
+def rmse_by_trial(controller, seeds, env):
     """RMSE (mm) of each trial in turn."""
-    told = load_model("station")
-    return [trial(controller, env, seed, told)["rmse_mm"] for seed in seeds]
+    nominal = load_model("station")
+    return [trial(controller, env, seed, nominal)["rmse_mm"] for seed in seeds]
 
 
 def test_half_is_learned_at_the_corner_without_phase():
@@ -202,8 +202,8 @@ def test_a_line_is_drawn_through_steps_that_say_nothing():
 
 def test_learning_trials_help_on_a_station_that_the_model_does_not_know():
     env = PMAEnv("displacement", pressure_kpa=400.0, model=weaker())
-    left = practised(PolicyWithILC(), range(300, 310), env)
-    alone = [practised(PolicyWithILC(), [seed], env)[0] for seed in range(307, 310)]
+    left = rmse_by_trial(PolicyWithILC(), range(300, 310), env)
+    alone = [rmse_by_trial(PolicyWithILC(), [seed], env)[0] for seed in range(307, 310)]
     assert np.mean(left[-3:]) < 0.85 * np.mean(alone)
 
 
@@ -258,12 +258,12 @@ def test_learning_begins_anew_elsewhere_and_after_its_repetitions():
     """The first trial of all is met again to the last bit."""
     controller = PolicyWithILC()
     env = PMAEnv("displacement", pressure_kpa=300.0, model=weaker())
-    first = practised(controller, [5], env)
-    assert practised(controller, [5], env) != first
-    practised(controller, [5], PMAEnv("displacement", pressure_kpa=350.0))
-    assert practised(controller, [5], env) == first
-    practised(controller, range(20, 20 + controller.repetitions - 1), env)
-    assert practised(controller, [5], env) == first
+    first = rmse_by_trial(controller, [5], env)
+    assert rmse_by_trial(controller, [5], env) != first
+    rmse_by_trial(controller, [5], PMAEnv("displacement", pressure_kpa=350.0))
+    assert rmse_by_trial(controller, [5], env) == first
+    rmse_by_trial(controller, range(20, 20 + controller.repetitions - 1), env)
+    assert rmse_by_trial(controller, [5], env) == first
 
 
 @pytest.mark.parametrize(
@@ -283,11 +283,11 @@ def test_what_it_cannot_do_is_refused_and_changes_nothing(task, options, message
     refused = PMAEnv(task, pressure_kpa=400.0, **options)
     refused.reset(seed=1)
     env = PMAEnv("displacement", pressure_kpa=300.0, model=weaker())
-    practised(controller, [5], env)
+    rmse_by_trial(controller, [5], env)
     for _ in range(2):
         with pytest.raises(PolicyError, match=re.escape(message)):
             controller.reset(refused.reference, refused.station)
-    assert practised(controller, [6], env) == practised(fresh, [5, 6], env)[1:]
+    assert rmse_by_trial(controller, [6], env) == rmse_by_trial(fresh, [5, 6], env)[1:]
 
 
 def test_without_a_trial_there_is_nothing_to_act_on(reading):
