@@ -116,7 +116,7 @@ def drawn(task, pressure_kpa, seed, **loop):
 
 @pytest.mark.parametrize("loop", [{}, {"control_rate_hz": 50.0, "action_delay_s": 0.02}])
 def test_noise_floor_is_reached_in_ten_trials(loop):
-    """As well as the same controller that was nominal the true model, within a fifth."""
+    """As well as the same controller that receives the true model, within a fifth."""
     env, nominal = drawn("displacement", 150, seed=300, **loop)
     learned = trials(env, nominal)
     errors = trials(env)
@@ -174,7 +174,7 @@ READING = (1.0, 2.0, 3.0, 4.0)
 
 
 def weaker():
-    """The station with a drive that pulls a tenth less than controllers are nominal."""
+    """The station with a drive that pulls a tenth less than the model that controllers receive."""
     nominal = load_model("station")
     return nominal.replace({"drive.gain_n_per_v": 0.9 * nominal.parameters["drive"].gain})
 
