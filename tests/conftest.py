@@ -1,4 +1,5 @@
 import os
+import sys
 
 import pytest
 from hypothesis import settings
@@ -37,3 +38,21 @@ def forget_user_effects(monkeypatch):
 
     yield forget
     forget()
+
+
+@pytest.fixture
+def run(tmp_path, monkeypatch, capsys):
+    """Runs `pma-gym` in a folder of its own: exit code, output, errors."""
+    from pma_gym.cli import main
+
+    monkeypatch.chdir(tmp_path)
+
+    def run(*arguments):
+        words = [str(argument) for argument in arguments]
+        monkeypatch.setattr(sys, "argv", ["pma-gym", *words])
+        with pytest.raises(SystemExit) as caught:
+            main(words)
+        printed = capsys.readouterr()
+        return caught.value.code or 0, printed.out, printed.err
+
+    return run

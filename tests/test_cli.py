@@ -7,7 +7,6 @@ import sys
 import numpy as np
 import pytest
 
-from pma_gym.cli import main
 from pma_gym.data.files.trial_files import read_trial, write_trial
 from pma_gym.data.trial import Trial
 from pma_gym.metrics import PHASE_SAMPLES, SAMPLE_RATE_HZ
@@ -15,20 +14,6 @@ from pma_gym.metrics import PHASE_SAMPLES, SAMPLE_RATE_HZ
 HEADER = "time_s,motor_voltage_v,regulator_voltage_v"
 WISHES = "time_s,motor_voltage_v,pressure_command_kpa"
 RAMP = f"{HEADER}\n0,0,5\n2,3,5\n4,3,5\n"
-
-
-@pytest.fixture
-def run(tmp_path, monkeypatch, capsys):
-    """Runs the command in a folder of its own: exit code, output, errors."""
-    monkeypatch.chdir(tmp_path)
-
-    def run(*arguments):
-        with pytest.raises(SystemExit) as caught:
-            main([str(argument) for argument in arguments])
-        printed = capsys.readouterr()
-        return caught.value.code or 0, printed.out, printed.err
-
-    return run
 
 
 @pytest.fixture
@@ -75,20 +60,21 @@ def test_commands_are_joined_or_held(run, ramp, tmp_path):
     assert loads["zoh"] == pytest.approx(0.0, abs=1e-6)
 
 
-def test_leaving_the_models_range_is_said(run, tmp_path):
-    (tmp_path / "high.csv").write_text(f"{HEADER}\n0,0,5\n1,0,10\n2,0,10\n")
-    code, _, err = run("simulate", "high.csv", "--model", "serres2008", "--out", "log.csv")
-    assert code == 0
-    assert "warning: model serres2008 holds for 150 to 575 kPa" in err
+MORE = RAMP.replace("regulator_voltage_v", "regulator_voltage_v,x", 1).replace(",5\n", ",5,1\n")
 
 
-def test_unknown_columns_are_said(run, tmp_path):
-    (tmp_path / "more.csv").write_text(
-        RAMP.replace("regulator_voltage_v", "regulator_voltage_v,x", 1).replace(",5\n", ",5,1\n")
-    )
-    code, _, err = run("simulate", "more.csv", "--model", "serres2008", "--out", "log.csv")
+@pytest.mark.parametrize(
+    ("content", "warning"),
+    [
+        (f"{HEADER}\n0,0,5\n1,0,10\n2,0,10\n", "model serres2008 holds for 150 to 575 kPa"),
+        (MORE, "in.csv: unknown columns are ignored: 'x'"),
+    ],
+)
+def test_what_is_doubtful_is_said(run, tmp_path, content, warning):
+    (tmp_path / "in.csv").write_text(content)
+    code, _, err = run("simulate", "in.csv", "--model", "serres2008", "--out", "log.csv")
     assert code == 0
-    assert "warning: more.csv: unknown columns are ignored: 'x'" in err
+    assert f"warning: {warning}" in err
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pma_gym.cli import main
 from pma_gym.data.files.trial_files import read_trial, write_trial
 from pma_gym.data.trial import Trial
 from pma_gym.discovery.diagnosis import Diagnosis
@@ -36,21 +35,11 @@ DIAGNOSIS = Diagnosis(
 )
 
 
-@pytest.fixture
-def run(tmp_path, monkeypatch, capsys):
-    """Runs the command in a folder with a data set `lab`: exit code, output, errors."""
-    monkeypatch.chdir(tmp_path)
+@pytest.fixture(autouse=True)
+def lab(tmp_path):
+    """A data set `lab` in the folder of the command."""
     (tmp_path / "lab").mkdir()
     write_trial(TRIAL, tmp_path / "lab" / "ramp.csv")
-
-    def run(*arguments):
-        monkeypatch.setattr(sys, "argv", ["pma-gym", *arguments])
-        with pytest.raises(SystemExit) as caught:
-            main([str(argument) for argument in arguments])
-        printed = capsys.readouterr()
-        return caught.value.code or 0, printed.out, printed.err
-
-    return run
 
 
 @pytest.fixture

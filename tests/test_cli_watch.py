@@ -3,7 +3,6 @@
 import pytest
 from PIL import Image
 
-from pma_gym.cli import main
 from pma_gym.envs import PMAEnv
 from pma_gym.tasks import TASKS, Task
 
@@ -38,19 +37,6 @@ def folder(tmp_path, monkeypatch):
     return tmp_path
 
 
-@pytest.fixture
-def run(capsys):
-    """Runs the command: exit code, output, errors."""
-
-    def run(*arguments):
-        with pytest.raises(SystemExit) as caught:
-            main(["watch", *map(str, arguments)])
-        printed = capsys.readouterr()
-        return caught.value.code or 0, printed.out, printed.err
-
-    return run
-
-
 def last_rmse(volts) -> str:
     """The RMSE (mm) of an episode under voltages by the environment, as the command prints it."""
     env = PMAEnv("displacement", pressure_kpa=300.0)
@@ -62,7 +48,7 @@ def last_rmse(volts) -> str:
 
 
 def test_commands_of_a_file_are_filmed(run, folder):
-    code, out, _ = run("--controller", "ramp.csv", "--video", "film.gif", "--width", 400)
+    code, out, _ = run("watch", "--controller", "ramp.csv", "--video", "film.gif", "--width", 400)
     assert code == 0
     assert out.splitlines() == ["14 pictures, 0.56 s: film.gif", last_rmse(lambda e: 2.0 * e.time)]
     with Image.open(folder / "film.gif") as film:
@@ -71,7 +57,7 @@ def test_commands_of_a_file_are_filmed(run, folder):
 
 def test_a_film_is_an_mp4(run, folder):
     ffmpeg = pytest.importorskip("imageio_ffmpeg")
-    assert run("--video", "film.mp4", "--width", 400)[0] == 0
+    assert run("watch", "--video", "film.mp4", "--width", 400)[0] == 0
     frames = ffmpeg.read_frames(str(folder / "film.mp4"))
     facts = next(frames)
     frames.close()
@@ -81,7 +67,7 @@ def test_a_film_is_an_mp4(run, folder):
 @pytest.mark.parametrize("source", ["mine.py:Half", "mine:Half"])
 def test_a_class_of_a_users_own_drives_the_window(run, source):
     pytest.importorskip("pygame")
-    code, out, _ = run("--controller", source)
+    code, out, _ = run("watch", "--controller", source)
     reference = TASKS["displacement"].schedule.at
     volts = last_rmse(lambda e: 100.0 * (reference(e.time) - e.measurement.extension) + 1.0)
     assert (code, out.strip()) == (0, volts)
@@ -96,7 +82,10 @@ def test_without_a_controller_every_kind_of_task_moves(run, task, monkeypatch):
         "picture",
         lambda env: moved.append(env.regulator_voltage + env.motor_voltage) or picture(env),
     )
-    assert run("--task", task, "--pressure", 550, "--video", "film.gif", "--width", 400)[0] == 0
+    assert (
+        run("watch", "--task", task, "--pressure", 550, "--video", "film.gif", "--width", 400)[0]
+        == 0
+    )
     assert max(moved) - min(moved) > 0.01
 
 
@@ -120,7 +109,7 @@ def test_without_a_controller_every_kind_of_task_moves(run, task, monkeypatch):
     ],
 )
 def test_what_cannot_be_used_ends_in_one_message(run, folder, arguments, words):
-    code, out, err = run(*arguments)
+    code, out, err = run("watch", *arguments)
     assert code == 2 and out == "" and err.count("error:") == 1
     assert words in err
     assert not list(folder.glob("*.gif"))

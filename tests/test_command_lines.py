@@ -14,7 +14,6 @@ import benchmarks.__main__
 import pma_gym
 import pma_gym.cli
 from controllers.policies.policy_file import load_policy_file
-from pma_gym.cli import main
 from pma_gym.cli.terminal import print_json
 from pma_gym.data.datasets.dataset import read_dataset
 from pma_gym.data.files.trial_files import read_trial, write_trial
@@ -115,20 +114,6 @@ def test_a_command_with_a_model_takes_the_effects_of_a_user(program, command, la
     after = said("--effect", "toe.py")
     assert after.endswith(" None") or "stopped" in after
     assert os.environ["PMA_GYM_EFFECTS"] == str(lab / "toe.py")
-
-
-@pytest.fixture
-def run(tmp_path, monkeypatch, capsys):
-    """Runs `pma-gym` in an empty folder: exit code, output, errors."""
-    monkeypatch.chdir(tmp_path)
-
-    def run(*arguments):
-        with pytest.raises(SystemExit) as caught:
-            main([str(argument) for argument in arguments])
-        printed = capsys.readouterr()
-        return caught.value.code or 0, printed.out, printed.err
-
-    return run
 
 
 def help_of(program, *command):

@@ -60,16 +60,3 @@ def circles(root: Path) -> list[tuple[str, ...]]:
 
 def test_no_module_imports_itself_by_way_of_others():
     assert circles(ROOT) == []
-
-
-def test_imports_for_types_and_in_functions_count(tmp_path):
-    package = tmp_path / "pma_gym"
-    package.mkdir()
-    (package / "a.py").write_text(
-        "from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    from pma_gym.b import B\n"
-    )
-    (package / "b.py").write_text("def b():\n    import pma_gym.c\n")
-    (package / "c.py").write_text("from pma_gym import a\n")
-    assert circles(tmp_path) == [("pma_gym.a", "pma_gym.b", "pma_gym.c")]
-    (package / "c.py").write_text("")
-    assert circles(tmp_path) == []

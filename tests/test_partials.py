@@ -1,7 +1,11 @@
-"""What a killed process leaves half-written is removed by the next one, and nothing else is."""
+"""What a killed process leaves half-written is removed by the next one, and nothing else is.
+
+Where a file may be written, said before anything is computed for it.
+"""
 
 import os
 import signal
+import stat
 import subprocess
 import sys
 import time
@@ -9,7 +13,7 @@ import time
 import pytest
 
 from pma_gym import partials
-from pma_gym.files import replace_file
+from pma_gym.files import OutputError, check_output, replace_file
 from pma_gym.partials import begin_partial, clean_folder, end_partial, is_leftover
 
 posix = pytest.mark.skipif(os.name != "posix", reason="processes are asked for by signals")
@@ -135,3 +139,22 @@ def test_a_name_as_long_as_the_file_system_allows_can_be_written(tmp_path):
     path = tmp_path / ("\N{GREEK SMALL LETTER OMEGA}" * 120 + ".csv")
     replace_file(path, b"1")
     assert path.read_bytes() == b"1" and len(names(tmp_path)) == 1
+
+
+def test_a_folder_that_allows_no_files_is_refused(tmp_path, monkeypatch):
+    def denied(dir):
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr("pma_gym.files.tempfile.TemporaryFile", denied)
+    message = r"no file can be made in the folder .* \(Permission denied\); name a file in another"
+    with pytest.raises(OutputError, match=message):
+        check_output(tmp_path / "new.csv")
+
+
+@pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() == 0, reason="root may write all")
+def test_a_protected_file_is_refused(tmp_path):
+    path = tmp_path / "kept.csv"
+    path.touch()
+    path.chmod(stat.S_IRUSR)
+    with pytest.raises(OutputError, match="write-protected; name another, or allow writing"):
+        check_output(path)

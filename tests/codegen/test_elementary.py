@@ -1,4 +1,7 @@
-"""NumPy's functions in laws: NumPy's values, exact slopes, and the same bits everywhere."""
+"""NumPy's functions in laws: NumPy's values, exact slopes, and the same bits everywhere.
+
+Derivatives that a law says itself.
+"""
 
 import math
 
@@ -10,8 +13,8 @@ from pma_gym.codegen.derivative import derivative
 from pma_gym.codegen.elementary import NUMPY
 from pma_gym.codegen.graph import CHANGING, FIXED, Graph
 from pma_gym.codegen.text import evaluate, python_text
-from pma_gym.codegen.trace import trace
-from pma_gym.effects.arithmetic import interp2d
+from pma_gym.codegen.trace import operation_counts, trace
+from pma_gym.effects.arithmetic import exponential, interp2d, sloping
 from pma_gym.plant.forms.symbolic import _Expressions
 
 LAWS = {
@@ -137,12 +140,50 @@ def test_a_table_of_two_inputs_is_linear_in_each_and_constant_outside():
 
 def test_what_laws_cannot_have_is_said():
     x = Graph().input("x", CHANGING)
-    with pytest.raises(
-        TypeError, match=r"laws have no np.arctan like this; of np they have .*tanh"
+    for message, act in (
+        (r"laws have no np.arctan like this; of np they have .*tanh", lambda: np.arctan(x)),
+        (r"use NumPy's functions, such as np.tanh\(x\), not math's", lambda: math.tanh(x)),
+        ("NotImplemented", lambda: np.exp(x) + np.zeros(2)),
     ):
-        np.arctan(x)
-    with pytest.raises(TypeError, match=r"use NumPy's functions, such as np.tanh\(x\), not math's"):
-        math.tanh(x)
-    with pytest.raises(TypeError, match="NotImplemented"):
-        np.exp(x) + np.zeros(2)
+        with pytest.raises(TypeError, match=message):
+            act()
     assert set(NUMPY) >= {"exp", "log", "tanh", "sqrt", "minimum", "maximum", "sin", "cos"}
+
+
+@pytest.mark.parametrize("factor", [-1.0, -2.5, 1.0, 0.75])
+def test_it_follows_the_chain_rule_whatever_becomes_of_its_argument(factor):
+    # A factor of -1 is simplified out of what the exponential is made of.
+    graph = Graph()
+    x, scale = graph.input("x", CHANGING), graph.input("scale", FIXED)
+    value = scale * trace(exponential, factor * x)
+    (slope,) = derivative(value, [x])
+    (curvature,) = derivative(slope, [x])
+    computed = evaluate([value, slope, curvature], {"x": 0.7, "scale": 3.0})
+    truth = 3.0 * math.exp(0.7 * factor)
+    expected = [truth, factor * truth, factor * factor * truth]
+    assert [float(number) for number in computed] == pytest.approx(expected, rel=1e-12)
+
+
+def test_a_derivative_costs_no_second_series():
+    x = Graph().input("x", CHANGING)
+    value = trace(exponential, -2.0 * x)
+    (slope,) = derivative(value, [x])
+    plain, both = (sum(operation_counts(v).values()) for v in ([value], [value, slope]))
+    assert both <= plain + 2
+
+
+def test_a_law_may_say_a_slope_of_its_own():
+    x = Graph().input("x", CHANGING)
+    value = trace(lambda x: sloping(x * x, x, 2.0 * x + 1.0), x)
+    (slope,) = derivative(value, [x])
+    assert float(evaluate([slope], {"x": 3.0})[0]) == 7.0
+
+
+def test_what_a_law_says_of_another_value_stays_out_of_it():
+    graph = Graph()
+    x, y = graph.input("x", CHANGING), graph.input("y", CHANGING)
+    value = trace(exponential, y) * x
+    by_x, by_y = derivative(value, [x, y])
+    computed = evaluate([by_x, by_y], {"x": 2.0, "y": 0.5})
+    expected = [math.exp(0.5), 2.0 * math.exp(0.5)]
+    assert [float(number) for number in computed] == pytest.approx(expected, rel=1e-12)

@@ -1,10 +1,19 @@
-"""The oracle: foresees what comes, knows the true station, and nothing of what is to come."""
+"""The oracle: foresees what comes, knows the true station, and nothing of what is to come.
+
+The achievable bound: below every controller, zero where the drive can give all.
+
+The exact inverse is one of the ideal controllers and `ImprovedFeedforward` is the same: equal but
+for the rounding of the times at which a voltage changes.
+"""
+
+from functools import lru_cache
 
 import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
 
-from controllers import FeedforwardPID, ImprovedFeedforward, Oracle
+from benchmarks.bounds import achievable_bound
+from controllers import CONTROLLERS, FeedforwardPID, ImprovedFeedforward, Oracle
 from controllers.design.bounded_least_squares import Space, best_plan
 from controllers.oracle import (
     HORIZON_S,
@@ -17,25 +26,13 @@ from controllers.oracle import (
 )
 from pma_gym.envs import PMAEnv
 from pma_gym.metrics import SAMPLE_RATE_HZ
+from pma_gym.plant.model import load_model
 from pma_gym.plant.plant import Plant
 from pma_gym.plant.statics import Condition
+from tests.controllers.conftest import trial
 
 LATE = {"control_rate_hz": 50.0, "action_delay_s": 0.02}
 DISTURBED = {"disturbances": "regulator_and_hand_push"}
-
-
-def commands_of(task, seed: int = 1, **options):
-    """Voltages that the oracle gave in an episode, and the environment."""
-    env = PMAEnv(task, **options)
-    env.reset(seed=seed)
-    oracle, ended, volts = Oracle(), False, []
-    oracle.receive(env)
-    oracle.reset(env.reference, env.station)
-    while not ended:
-        volts.append(oracle.act(env.measurement, env.time))
-        _, _, terminated, truncated, _ = env.step(env.action(volts[-1]))
-        ended = terminated or truncated
-    return np.array(volts), env
 
 
 # -- foresight -------------------------------------------------------------------------------------
@@ -150,17 +147,52 @@ def test_it_commands_the_regulator_where_that_is_the_actuator(drive):
         assert all(got[phase] < 0.8 * feedforward[phase] for phase in got)
 
 
-def test_no_noise_enters_it():
-    noisy, _ = commands_of("displacement", pressure_kpa=300.0)
-    other, _ = commands_of("displacement", seed=2, pressure_kpa=300.0)
-    silent, _ = commands_of("displacement", noise=False, pressure_kpa=300.0)
+def test_no_noise_enters_it(drive):
+    _, noisy = drive(Oracle(), "displacement", 300)
+    _, other = drive(Oracle(), "displacement", 300, seed=2)
+    _, silent = drive(Oracle(), "displacement", 300, noise=False)
     assert np.array_equal(noisy, silent) and np.array_equal(noisy, other)
 
 
-def test_it_does_not_know_disturbances_to_come():
-    calm, _ = commands_of("displacement", pressure_kpa=300.0)
-    disturbed, env = commands_of("displacement", pressure_kpa=300.0, disturbances="regulator")
+def test_it_does_not_know_disturbances_to_come(drive):
+    env = PMAEnv("displacement", pressure_kpa=300.0, disturbances="regulator")
+    trial(Oracle(), env)
+    _, calm = drive(Oracle(), "displacement", 300)
+    disturbed = env.voltages
     # It comes with this step, whose command is given before it.
     step = int(np.ceil(env.events.step_times[0] / env.options.period))
     assert np.array_equal(calm[: step + 1], disturbed[: step + 1])
     assert calm[step + 1] != disturbed[step + 1]
+
+
+RIVALS = [
+    make
+    for make in CONTROLLERS.values()
+    if not hasattr(make, "receive") and "rotation" in getattr(make, "kinds", ["rotation"])
+]
+
+bound_of = lru_cache(achievable_bound)
+
+
+@pytest.mark.campaign
+@pytest.mark.parametrize(("task", "pressure"), [("rotation", 400), ("displacement", 300)])
+def test_no_controller_comes_closer(task, pressure, drive):
+    bound = bound_of("station", task, pressure)
+    for make in RIVALS:
+        got, _ = drive(make(), task, pressure)
+        assert all(bound[phase] <= 1.02 * got[phase] for phase in bound)
+
+
+@pytest.mark.campaign
+def test_phase_three_is_limited_by_what_the_drive_cannot_push():
+    # More friction of the rotor brakes it sooner where the cable hangs loose.
+    model = load_model("station")
+    braked = model.replace({"rotor.damping_n_m_s": 7.64e-3})
+    free = bound_of("station", "rotation", 400)["III"]
+    assert achievable_bound(braked, "rotation", 400)["III"] > 3.0 * free > 0.0
+
+
+@pytest.mark.campaign
+def test_cascade_that_is_pushed_and_pulled_alike_has_no_floor():
+    bound = achievable_bound("cascade", "rotation", 300)
+    assert np.all(np.array(list(bound.values())) < 0.005)

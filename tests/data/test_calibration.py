@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from numpy.testing import assert_allclose
 
 from pma_gym.data.calibration import (
     DAQ_LIMIT,
@@ -43,12 +42,6 @@ def test_lines_are_those_of_table_1(unit, value):
     assert volts == pytest.approx(gain * value + offset, rel=1e-12, abs=1e-12)
     back = sensor.from_volts(volts) / SI_FACTORS[unit]
     assert back == pytest.approx(value, rel=1e-9, abs=1e-9)
-
-
-def test_arrays_go_through_like_floats():
-    volts = np.array([[0.0, 1.0], [-2.5, np.nan]])
-    assert_allclose(LVDT.from_volts(volts)[1, 0], LVDT.from_volts(-2.5))
-    assert np.isnan(LVDT.from_volts(volts)[1, 1])
 
 
 @pytest.mark.parametrize(

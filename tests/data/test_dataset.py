@@ -9,7 +9,7 @@ import pytest
 from pma_gym.data.datasets.dataset import read_dataset
 from pma_gym.data.datasets.lab_sensors import LabSensor
 from pma_gym.data.files.even_clock import joined
-from pma_gym.data.files.trial_files import TrialWarning, write_trial
+from pma_gym.data.files.trial_files import TrialWarning
 from pma_gym.data.quality.gaps import gaps
 from pma_gym.data.trial import Trial, TrialError
 
@@ -112,17 +112,6 @@ def test_a_description_names_title_model_columns_and_trials(folder):
     # A shipped model stays a name.
     describe(folder, 'model = "serres2008"\n[columns]\n"Weg" = "contraction_mm"')
     assert read_dataset(folder).model == "serres2008"
-
-
-def test_parquet_and_xlsx_are_trials_too(folder):
-    pytest.importorskip("pyarrow")
-    pytest.importorskip("openpyxl")
-    time, names = np.arange(4.0), ("a.parquet", "b.xlsx", "c.csv")
-    for name in names:
-        write_trial(Trial(time, {"motor_voltage": time}, {"load": 100.0 * time}), folder / name)
-    trials = read_dataset(folder).trials
-    assert tuple(each.name for each in trials) == names
-    np.testing.assert_allclose([e.trial.measurements["load"] for e in trials], [100.0 * time] * 3)
 
 
 def test_a_folder_that_is_none_is_refused(folder, tmp_path):

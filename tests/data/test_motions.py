@@ -103,21 +103,22 @@ def test_random_numbers_are_those_of_the_counter_and_never_change():
     assert levels(0, 0.25, 0.95, 0.1, 0.3, 10.0).positions[1] == pytest.approx(0.271411968)
 
 
-def test_displacement_is_5_mm_a_second():
-    reference = DISPLACEMENT.reference(np.array([0.0, 1.0, 2.5, 5.0]))
-    assert_allclose(reference * 1e3, [0, 5, 12.5, 25], rtol=1e-14)
-    assert DISPLACEMENT.duration == 5.0
-
-
-def test_rotation_goes_to_90_deg_holds_and_returns():
-    reference = np.rad2deg(ROTATION.reference(np.array([0.0, 2.5, 5.0, 7.0, 10.0, 11.0, 15.0])))
-    assert_allclose(reference, [0, 45, 90, 90, 90, 72, 0], atol=1e-13)
-    assert ROTATION.duration == 15.0
-
-
-def test_the_ends_are_held():
-    assert_allclose(ROTATION.reference(np.array([-1.0, 99.0])), 0, atol=1e-15)
-    assert_allclose(DISPLACEMENT.reference(99.0), 0.025)
+@pytest.mark.parametrize(
+    ("schedule", "duration", "positions"),
+    [
+        # 5 mm/s; beyond its ends it stands.
+        (DISPLACEMENT, 5.0, {0.0: 0, 1.0: 5, 2.5: 12.5, 5.0: 25, 99.0: 25}),
+        (
+            ROTATION,
+            15.0,
+            {-1.0: 0, 2.5: 45, 5.0: 90, 7.0: 90, 10.0: 90, 11.0: 72, 15.0: 0},
+        ),
+    ],
+)
+def test_the_dissertations_references(schedule, duration, positions):
+    expected = np.array([*positions.values()]) * SI_FACTORS[schedule.unit]
+    assert_allclose(schedule.reference(np.array([*positions])), expected, rtol=1e-14, atol=1e-15)
+    assert schedule.duration == duration
 
 
 def test_shape_is_kept():

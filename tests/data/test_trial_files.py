@@ -137,20 +137,6 @@ def test_raw_sensor_volts_are_decoded_by_table_1(tmp_path):
     assert_allclose(np.rad2deg(trial.measurements["rotation"]), [0, 45], atol=1e-12)
 
 
-def test_a_labs_own_names_units_and_signs(tmp_path):
-    text = "t [ms],Weg,Motor\n0,60,0\n500,50,819\n"
-    mapping = {
-        "t [ms]": {"name": "time_s", "factor": 1e-3},
-        "Weg": {"name": "contraction_mm", "factor": -1, "offset": 100.0},
-        "Motor": {"name": "motor_voltage_v", "factor": 10 / 4095},
-    }
-    trial = read_trial(written(tmp_path, text), columns=mapping)
-    assert_array_equal(trial.time, [0, 0.5])
-    assert_allclose(trial.measurements["contraction"], [0.040, 0.050])
-    assert_allclose(trial.commands["motor_voltage"], [0, 2])
-    assert len(read_trial(written(tmp_path, GOOD.replace("time_s", "t")), {"t": "time_s"})) == 3
-
-
 @pytest.mark.parametrize(
     ("text", "mapping", "message"),
     [
@@ -372,14 +358,3 @@ def test_an_interrupted_write_leaves_the_old_file_and_nothing_else(suffix, tmp_p
         write_trial(Trial([0.0], {"load_command": [1.0]}), path)
     assert path.read_bytes() == before
     assert list(tmp_path.iterdir()) == [path]
-
-
-def test_a_full_disk_leaves_nothing(tmp_path, monkeypatch):
-    def full(self, content):
-        self.touch()
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr(Path, "write_bytes", full)
-    with pytest.raises(OSError, match="No space left"):
-        write_trial(Trial([0.0], {"load_command": [0.0]}), tmp_path / "ramp.csv")
-    assert not list(tmp_path.iterdir())

@@ -15,9 +15,7 @@ import pytest
 
 from pma_gym.effects import CATALOGUE
 from pma_gym.envs import PMAEnv, PMAVectorEnv
-from pma_gym.plant.equilibrium.solver import equilibria_at
 from pma_gym.plant.model import load_model
-from pma_gym.plant.plant import Plant
 from pma_gym.plant.simulation import Run, simulate_all
 from tests.integrator.reference import TRIALS
 
@@ -90,20 +88,6 @@ def test_a_neutral_effect_leaves_a_trial(name, case, station, station_with):
         np.testing.assert_allclose(seen[output], values, rtol=0.0, atol=limit, err_msg=output)
 
 
-@pytest.mark.parametrize("name", EVERY)
-def test_a_neutral_effect_leaves_every_rate(name, station, station_with):
-    plant, generator = station_with(name, neutral=True), np.random.default_rng(3)
-    columns = kept(plant, station)
-    rest = station.settle(2.0, 300e3)
-    for _ in range(50):
-        state = rest.state * (1.0 + 0.1 * generator.standard_normal(rest.state.shape))
-        wide = np.zeros(len(plant.states))
-        wide[columns] = state
-        commands = generator.uniform(0, 10), generator.uniform(2, 9), 0.04
-        rates = plant.derivative(wide, *commands)[columns]
-        np.testing.assert_array_equal(rates, station.derivative(state, *commands))
-
-
 def filled(plant, end):
     """States while the pressure is raised from 300 kPa."""
     time = np.arange(0.0, 0.5, 0.01)
@@ -148,17 +132,6 @@ MANY = (
 def model():
     usual = {name: CATALOGUE[name].values_in_files(CATALOGUE[name].usual) for name in MANY}
     return load_model("station").with_effects(usual)
-
-
-def test_many_rest_as_one_does(model):
-    plant = Plant(model)
-    regulator = np.array([plant.regulator_voltage(p) for p in (200e3, 300e3, 500e3)])
-    motor = np.array([0.0, 2.0, 4.0])
-    states, zero = equilibria_at(plant, motor, regulator)
-    for i in range(3):
-        alone = plant.settle(motor[i], regulator_voltage=regulator[i])
-        np.testing.assert_array_equal(alone.state, states[i])
-        assert np.abs(plant.derivative(states[i], motor[i], regulator[i], zero[i])).max() < 1e-7
 
 
 def test_many_environments_have_the_bits_of_one(model):

@@ -8,51 +8,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pma_gym.codegen.graph import CHANGING, Graph
-from pma_gym.codegen.text import evaluate
-from pma_gym.codegen.trace import as_numpy, trace
 from pma_gym.effects import CATALOGUE
 from pma_gym.effects.arithmetic import exponential
 from pma_gym.effects.effect import signals
 from pma_gym.effects.ports import measured_output
-from pma_gym.plant.model import Model, load_model, shipped_models
+from pma_gym.plant.model import Model, load_model
 from pma_gym.plant.plant import Plant
 from pma_gym.plant.rigs import RIGS
 from pma_gym.plant.statics import Condition
-
-SIGNALS = {
-    "pressure": (0.0, 600e3),
-    "contraction": (-0.01, 0.07),
-    "velocity": (-0.2, 0.2),
-    "memory": (-1.0, 1.0),
-    "stretch": (-1e-3, 2e-3),
-    "stretch_rate": (-0.1, 0.1),
-    "motor_voltage": (0.0, 10.0),
-    "regulator_voltage": (0.0, 10.0),
-    "pressure_asked": (0.0, 600e3),
-    "pressure_command": (0.0, 600e3),
-    "regulator_pace": (0.5, 2.0),
-    "displacement_input": (0.0, 0.05),
-    "displacement": (0.0, 0.05),
-    "displacement_rate": (-0.2, 0.2),
-    "signal": (-0.01, 500e3),
-    "position": (-1.5, 1.5),
-    "drive_force": (-400.0, 400.0),
-    "carried_force": (-400.0, 400.0),
-    "travel": (0.0, 30e-6),
-    "direction": (1.0, 1.0),
-    "cable_tension": (0.0, 1000.0),
-    "load": (0.0, 1000.0),
-    "load_asked": (0.0, 1000.0),
-    "load_command": (0.0, 1000.0),
-    "load_arriving": (0.0, 1000.0),
-    "angle": (-0.1, 2.5),
-    "motor_angle": (-2.7, 0.5),
-    "spin": (-4.0, 4.0),
-    "command": (-7.0, 7.0),
-    "regulator_time_constant": (0.01, 0.2),
-}
-"""Ranges of what laws are given (SI)."""
 
 PHENOMENA = (
     "muscle_force",
@@ -74,84 +37,6 @@ LAWS = [
     for effect in CATALOGUE.values()
     for law in effect.laws()
 ]
-
-
-@cache
-def shipped(name):
-    """Parameters of an effect in some shipped model; its usual ones if in none."""
-    for model in map(load_model, shipped_models()):
-        if name in model.parameters:
-            return model.parameters[name]
-    return CATALOGUE[name].usual
-
-
-def arguments(effect, law, rows, seed=0):
-    """Arrays of signals of a law, `None` where its parameters go."""
-    generator = np.random.default_rng(seed)
-    given = []
-    for name in signals(law):
-        if name in ("p", "servo"):
-            given.append(shipped("servo" if name == "servo" else effect.name))
-        elif name == "memory" and effect.memories > 1:
-            rolls = [generator.uniform(*SIGNALS[name], rows) for _ in range(effect.memories)]
-            given.append(tuple(rolls))
-        else:
-            given.append(generator.uniform(*SIGNALS[name], rows))
-    return given
-
-
-def flat(outputs):
-    """What a law returns, as one list: a number, a pair, or pairs for several memories."""
-    parts = outputs if isinstance(outputs, tuple) else (outputs,)
-    return [number for part in parts for number in (part if isinstance(part, tuple) else (part,))]
-
-
-def one_row(given, row):
-    def number(value):
-        if isinstance(value, tuple):
-            return value if hasattr(value, "_fields") else tuple(map(number, value))
-        return float(value[row])
-
-    return [number(value) for value in given]
-
-
-def traced(law, given):
-    """What the law gives for arrays once it is a graph, one row an output."""
-    graph, arguments, numbers = Graph(), [], {}
-    for name, value in zip(signals(law), given, strict=True):
-        if isinstance(value, tuple) and not hasattr(value, "_fields"):
-            places = [f"{name}_{i}" for i in range(len(value))]
-            arguments.append(tuple(graph.input(place, CHANGING) for place in places))
-            numbers |= dict(zip(places, value, strict=True))
-        elif isinstance(value, tuple):
-            arguments.append(graph.inputs(name, value))
-            for field, number in value._asdict().items():
-                row = number if isinstance(number, tuple) else ()
-                numbers |= {f"{name}.{field}[{i}]": n for i, n in enumerate(row)}
-                numbers[f"{name}.{field}"] = number
-        else:
-            arguments.append(graph.input(name, CHANGING))
-            numbers[name] = value
-    traced_values = trace(law, *arguments)
-    return evaluate([graph.value(part) for part in flat(traced_values)], numbers)
-
-
-@pytest.mark.parametrize(("effect", "law"), LAWS)
-def test_one_text_gives_one_number_finite_wherever_its_signals_go(effect, law):
-    given = arguments(effect, law, 200)
-    plain = np.array([flat(law(*one_row(given, row))) for row in range(200)], float)
-    assert np.isfinite(plain).all()
-    if law is effect.rate:
-        assert np.all(plain[:, 1::2] >= 0.0)
-    # Compiled code has the bits of the graph: `tests/kernels`.
-    for part, computed, expected in zip(
-        flat(as_numpy(law)(*given)), traced(law, given), plain.T, strict=True
-    ):
-        scale = np.abs(expected).max()
-        for value in (part, computed):
-            np.testing.assert_allclose(
-                np.broadcast_to(value, 200), expected, rtol=1e-12, atol=1e-12 * scale
-            )
 
 
 @pytest.mark.parametrize(("effect", "law"), LAWS)

@@ -1,6 +1,8 @@
 """What effects of the drive leave in data: dead zone, saturation, lag, ripple.
 
 Unequal phase currents: where the shaft stands decides, and table I3 has it.
+
+Dead time of the commands: what comes out is what went in, a while ago.
 """
 
 import numpy as np
@@ -9,11 +11,20 @@ import pytest
 from pma_gym.data.serres2008 import load_table
 from pma_gym.effects import CATALOGUE
 from pma_gym.effects.arithmetic import cosine
-from pma_gym.effects.drive.current_imbalance import imbalance_load
+from pma_gym.effects.delay import (
+    DriveDelay,
+    RegulatorDelay,
+    delayed_load,
+    delayed_load_rate,
+    delayed_pressure,
+    delayed_pressure_rate,
+)
 from pma_gym.effects.drive.drive_dead_zone import load_beyond_dead_zone
 from pma_gym.effects.drive.drive_lag import late_load
-from pma_gym.effects.drive.torque_ripple import ripple_load
+from pma_gym.effects.sensors.sensor_delay import SensorDelay, late_reading, late_reading_rate
 from pma_gym.plant.equilibrium.solver import equilibria_at
+from pma_gym.plant.model import load_model
+from pma_gym.plant.plant import Plant
 
 VOLTAGES = np.array([0.0, 0.1, 0.2, 0.3, 0.5, 1.0, 2.0, 4.0])
 
@@ -78,16 +89,6 @@ def test_a_late_drive_follows_a_step_exponentially(station_with, share):
         assert arrived == pytest.approx(expected, rel=1e-5)
 
 
-def test_a_late_drive_is_part_of_the_linear_system(station_with, station):
-    late = station_with("drive_lag", time_constant_ms=20.0).linearize(300e3, 0.03)
-    plain = station.linearize(300e3, 0.03)
-    assert late.nstates == plain.nstates + 1
-    assert np.min(np.abs(late.poles() + 50.0)) < 1e-3
-    at = late.output_labels.index("extension"), late.input_labels.index("motor_voltage")
-    gains = [np.real(system.dcgain())[at] for system in (late, plain)]
-    assert gains[0] == pytest.approx(gains[1], rel=1e-4)
-
-
 def test_the_laws_cosine_is_exact_to_1e_11():
     values = np.concatenate([np.linspace(-300.0, 300.0, 20_001), np.linspace(-1e4, 1e4, 20_001)])
     assert np.abs(cosine(values) - np.cos(values)).max() < 1e-11
@@ -104,17 +105,6 @@ def test_ripple_comes_as_often_a_turn_as_it_says(station_with):
     assert np.abs(share).max() == pytest.approx(0.01, rel=1e-3)
     np.testing.assert_allclose(share, 0.01 * np.cos(24.0 * angles), atol=1e-8)
     assert np.ptp(angles) > np.radians(60.0)
-
-
-def test_ripple_repeats_after_a_period_and_has_no_mean():
-    p = CATALOGUE["torque_ripple"].parse(
-        {"amplitude_percent": 0.5, "periods": 12.0, "phase_deg": 40.0}
-    )
-    turn = np.linspace(0.0, 2.0 * np.pi, 241)[:-1]
-    loads = np.array([ripple_load(400.0, angle, p) for angle in turn])
-    assert loads.mean() == pytest.approx(0.0, abs=1e-9)
-    assert loads.max() <= 2.0 + 1e-12
-    np.testing.assert_allclose(loads, np.roll(loads, 20), atol=1e-9)
 
 
 def test_one_effect_of_the_drive_takes_what_the_one_before_gives():
@@ -157,16 +147,6 @@ def test_peaks_stand_where_the_slide_stands_at_every_pressure(station_with):
     assert places[0] == pytest.approx(places[1], abs=2e-3)
 
 
-def test_it_swings_in_proportion_to_the_load_and_about_it():
-    p = CATALOGUE["current_imbalance"].usual
-    turn = np.linspace(0.0, 2.0 * np.pi, 361)[:-1]
-    loads = np.array([imbalance_load(400.0, angle, p) for angle in turn])
-    assert loads.mean() == pytest.approx(0.0, abs=1e-9)
-    assert np.abs(loads).max() == pytest.approx(0.025 * 400.0, rel=1e-3)
-    np.testing.assert_allclose(loads, np.roll(loads, 60), atol=1e-9)
-    assert imbalance_load(0.0, 0.3, p) == 0.0
-
-
 def fitted(columns, loads, chosen):
     """Rms (N) of loads about their fit on some rows, at the other rows."""
     coefficients, *_ = np.linalg.lstsq(columns[chosen], loads[chosen], rcond=None)
@@ -195,3 +175,101 @@ def test_table_i3_has_it_on_pressures_that_were_not_fitted_to():
     tried = np.arange(2.0, 12.05, 0.1)
     errors = [fitted(np.column_stack([line, *wave(stands, n)]), loads, ~seen)[0] for n in tried]
     assert tried[int(np.argmin(errors))] == pytest.approx(6.0, abs=0.25)
+
+
+DELAY_S = 0.02
+
+
+def multisine(time, mean, swing):
+    """A smooth command of up to 3 Hz."""
+    waves = [np.sin(2.0 * np.pi * f * time + p) for f, p in [(0.4, 0.0), (1.1, 1.0), (3.0, 2.0)]]
+    return mean + swing * sum(waves) / 3.0
+
+
+LAWS = {
+    "drive": (delayed_load, delayed_load_rate, DriveDelay),
+    "regulator": (delayed_pressure, delayed_pressure_rate, RegulatorDelay),
+    "sensor": (late_reading, late_reading_rate, SensorDelay),
+}
+
+
+@pytest.mark.parametrize("name", LAWS)
+@pytest.mark.parametrize(("angle", "error"), [(0.3, 1e-8), (0.5, 2e-7), (1.0, 2e-5), (2.0, 2e-3)])
+def test_amplitude_and_phase_are_those_of_a_true_delay(name, angle, error):
+    """The response at w T = angle, from the laws themselves, beside exp(-i w T)."""
+    law, law_rate, parameters = LAWS[name]
+    p = parameters(1.0, DELAY_S)
+
+    def rates(value, memory):
+        pairs = law_rate(value, tuple(memory), p)
+        return np.array([s - decay * m for (s, decay), m in zip(pairs, memory, strict=True)])
+
+    drift = np.stack([rates(0.0, unit) for unit in np.eye(4)], axis=1)
+    state = np.linalg.solve(1j * angle / DELAY_S * np.eye(4) - drift, rates(1.0, np.zeros(4)))
+    assert abs(law(1.0, state, p) - np.exp(-1j * angle)) < error
+    assert law(1.0, (0.0, 1.0, 0.0, 1.0), p) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("share", [1.0, 0.4])
+def test_a_delayed_drive_asks_for_what_was_asked_before(station_with, share):
+    plant = station_with("drive_delay", share=share, delay_ms=1e3 * DELAY_S)
+    time = np.arange(0.0, 4.0, 0.002)
+    motor = multisine(time, 3.0, 1.5)
+    states, _ = plant.run(time, motor, np.full(len(time), plant.regulator_voltage(300e3)))
+    drive, p = (plant.model.parameters[name] for name in ("drive", "drive_delay"))
+    columns = [plant.states.index(name) for name in CATALOGUE["drive_delay"].memory_names]
+    asked = drive.gain * motor + drive.offset
+    loads = np.array(
+        [delayed_load(a, tuple(m), p) for a, m in zip(asked, states[:, columns], strict=True)]
+    )
+    # The first while still knows the command at rest, which stood still.
+    late = np.interp(time - DELAY_S, time, asked)
+    expected = asked + share * (late - asked)
+    later = time > 0.2
+    error = np.abs(loads - expected)[later].max() / np.ptp(asked)
+    # At 3 Hz, w = 0.38: the law is exact to 1e-8, the commands are joined linearly.
+    assert error < 2e-4
+    assert np.abs(loads - asked)[later].max() / np.ptp(asked) > 0.1 * share
+
+
+def test_a_delayed_regulator_fills_a_while_later(station_with, station):
+    late = station_with("regulator_delay", delay_ms=1e3 * DELAY_S)
+    time = np.arange(0.0, 3.0, 0.002)
+
+    def pressures(plant):
+        line = plant.model.parameters["regulator_line"]
+        volts = (multisine(time, 300e3, 50e3) - line.offset) / line.gain
+        states, zero = plant.run(time, np.full(len(time), 1.0), volts)
+        return plant.observe(states, zero)["pressure"]
+
+    plain, late_pressures = pressures(station), pressures(late)
+    expected = np.interp(time - DELAY_S, time, plain)
+    later = time > 0.5
+    assert np.abs(late_pressures - expected)[later].max() < 0.005 * np.ptp(plain)
+    assert np.abs(late_pressures - plain)[later].max() > 0.05 * np.ptp(plain)
+
+
+def test_delays_are_part_of_the_linear_system(station_with, station):
+    late = station_with("drive_delay", delay_ms=1e3 * DELAY_S).linearize(300e3, 0.03)
+    plain = station.linearize(300e3, 0.03)
+    assert late.nstates == plain.nstates + 4
+    at = late.output_labels.index("extension"), late.input_labels.index("motor_voltage")
+    frequency = 2.0 * np.pi * 2.0
+    ratio = late(1j * frequency)[at] / plain(1j * frequency)[at]
+    assert np.angle(ratio) == pytest.approx(-frequency * DELAY_S, rel=1e-6)
+    assert abs(ratio) == pytest.approx(1.0, abs=1e-6)
+
+
+def test_a_cascade_has_a_delayed_regulator_too():
+    plain = Plant("cascade")
+    late = Plant(
+        load_model("cascade").with_effects({"regulator_delay": {"share": 1.0, "delay_ms": 20}})
+    )
+    time = np.arange(0.0, 0.5, 0.001)
+    volts = np.where(time > 0.0, *(plain.regulator_voltage(p) for p in (350e3, 300e3)))
+
+    def half(plant):
+        states, zero = plant.run(time, np.full(len(time), 2.0), volts)
+        return time[np.argmax(plant.observe(states, zero)["pressure"] > 325e3)]
+
+    assert half(late) - half(plain) == pytest.approx(0.02, abs=0.002)

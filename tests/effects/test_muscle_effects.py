@@ -54,16 +54,6 @@ def stiffness_at(station, contraction, pressure=300e3):
     return (low - high) / 2e-4
 
 
-def test_a_held_branch_relaxes_with_its_own_time_constant():
-    p = CATALOGUE["creep"].parse({"stiffness_n_per_mm": 0.6, "time_constant_s": 2.0})
-    source, decay = creep_rate(0.0, p)
-    assert (source, decay) == (0.0, 0.5)
-    source, _ = creep_rate(-0.01, p)
-    # Pulled out, it pulls back.
-    assert source == pytest.approx(-6.0)
-    assert creep_force(-6.0) > 0.0
-
-
 @pytest.mark.parametrize("name", ["creep", "slow_creep"])
 def test_a_creeping_branch_only_ever_loses_energy(name):
     values = {"creep": 2.0, "slow_creep": 40.0}
@@ -186,18 +176,6 @@ def test_damping_by_load_peaks_at_middle_load_and_does_not_push():
     assert np.abs(np.diff(slope)).max() < 0.1
 
 
-def test_a_loaded_muscle_is_slower_with_damping_by_load(station_with, station):
-    time = np.concatenate([[0.0], np.arange(1e-3, 0.5, 1e-3)])
-    motor = np.where(time > 0.0, 4.5, 4.0)
-
-    def rise(plant):
-        way = run(plant, time, motor, 300e3)[1]["extension"]
-        way = (way - way[0]) / (way[-1] - way[0])
-        return time[np.argmax(way > 0.63)]
-
-    assert rise(station_with("load_dependent_damping")) > 1.5 * rise(station)
-
-
 def test_a_curved_spring_adds_its_polynomial():
     p = CATALOGUE["nonlinear_stiffness"].parse(
         {"linear": 0.5, "quadratic": 1.0, "stiffness_n_per_mm": 20, "resting_length_mm": 250}
@@ -205,15 +183,6 @@ def test_a_curved_spring_adds_its_polynomial():
     for x in (-0.005, 0.0, 0.02, 0.06):
         u = x / 0.25
         assert stiffening_force(x, p) == pytest.approx(-20e3 * x * (0.5 * u + u * u), abs=1e-12)
-
-
-def test_a_curved_spring_shortens_the_contraction_most_where_it_is_long(station_with, station):
-    plant = station_with("nonlinear_stiffness")
-    less = [
-        station.settle(0.0, p).zero_contraction - plant.settle(0.0, p).zero_contraction
-        for p in (200e3, 300e3, 400e3, 500e3)
-    ]
-    assert np.all(np.diff(less) > 0.0) and 1e-3 < less[0] < less[-1] < 2e-2
 
 
 def warmed(station_with, repeat, pressure):

@@ -12,9 +12,8 @@ import pytest
 
 from pma_gym.data.trial import Trial
 from pma_gym.effects import CATALOGUE
-from pma_gym.effects.sensors.potentiometer_backlash import play, play_rate
 from pma_gym.effects.sensors.sensor_delay import SENSOR_DELAYS
-from pma_gym.plant.equilibrium.solver import NoLoadEquilibria, equilibria_at
+from pma_gym.plant.equilibrium.solver import NoLoadEquilibria
 from pma_gym.plant.model import Model, ModelError, load_model
 from pma_gym.plant.plant import Plant
 
@@ -38,13 +37,6 @@ def test_a_large_step_rises_straight_and_a_small_one_as_ever(station_with, stati
         pressures(plant, 50e3, dense), pressures(station, 50e3, dense), atol=5.0
     )
     assert np.abs(rising - pressures(station, 300e3, dense)).max() > 50e3
-
-
-def test_a_limited_regulator_rests_where_it_is_told(station_with):
-    plant = station_with("regulator_rate_limit", limit_kpa_per_s=10.0)
-    for pressure in (150e3, 300e3, 575e3):
-        rest = plant.settle(1.0, pressure)
-        assert rest.state[plant.states.index("pressure")] == pytest.approx(pressure, rel=1e-12)
 
 
 LINES = [
@@ -77,19 +69,6 @@ def test_a_wrong_sensor_reads_a_line_of_the_truth(name, quantity, gain, offset, 
             # Ten time constants of the slowest sensor after the last move.
             scale = np.abs(truth).max()
             assert logged.measurements[other][row] == pytest.approx(wrong[row], abs=1e-6 * scale)
-
-
-@pytest.mark.parametrize(("name", "quantity", "gain", "offset"), LINES)
-def test_many_wrong_sensors_begin_at_rest(name, quantity, gain, offset, station_with):
-    plant = station_with(name)
-    assert NoLoadEquilibria(plant)(np.array([300e3])) is None
-    voltages = np.full(2, plant.regulator_voltage(300e3))
-    states, zero = equilibria_at(plant, np.array([0.0, 2.0]), voltages)
-    for motor, state, x0 in zip((0.0, 2.0), states, zero, strict=True):
-        alone = plant.settle(motor, 300e3)
-        np.testing.assert_array_equal(alone.state, state)
-        rates = plant.derivative(state, motor, voltages[0], x0)
-        assert np.all(np.abs(rates) < 1e-5)
 
 
 def test_the_truth_knows_nothing_of_a_wrong_sensor(station_with, station):
@@ -184,14 +163,6 @@ def test_friction_in_the_bearing_is_told_by_the_direction_at_one_voltage(station
     np.testing.assert_allclose(missing[outwards], -force, atol=0.05)
 
 
-def test_without_it_the_load_is_that_of_the_voltage(station):
-    _, truth = slowly(station)
-    drive = station.model.parameters["drive"]
-    missing = drive.gain * MOTOR + drive.offset - truth["load"]
-    away_from_the_turn = (TIME > 4.0) & (TIME < 18.9) & (abs(TIME - 10.0) > 0.5)
-    assert np.abs(missing[away_from_the_turn]).max() < 0.05
-
-
 @pytest.mark.parametrize("width", [2.0, 5.0])
 def test_play_is_lost_at_every_turn(station_with, width):
     plant = station_with("potentiometer_backlash", width_deg=width)
@@ -211,15 +182,6 @@ def test_play_is_nowhere_but_in_the_potentiometer(station_with, station):
     readings, expected = slowly(station_with("potentiometer_backlash")), slowly(station)
     for name, values in expected[1].items():
         np.testing.assert_allclose(readings[1][name], values, atol=1e-5 * np.ptp(values) + 1e-12)
-
-
-def test_the_reading_never_runs_backwards():
-    p = CATALOGUE["potentiometer_backlash"].usual
-    for z in np.linspace(-1.0, 1.0, 41):
-        for spin in (-1.0, 1.0):
-            source, decay = play_rate(spin, z, p)
-            reading = spin + play(source - decay * z, p)
-            assert -1e-12 <= reading * spin <= 1.0 + 1e-12
 
 
 def test_a_cascade_has_no_play():

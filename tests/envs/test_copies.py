@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 
 from pma_gym.envs import PMAEnv, PMAVectorEnv
-from pma_gym.plant.model import load_model
 from pma_gym.tasks import EVERY_TASK, following, varied_station
 from tests.envs.conftest import EVERYTHING, SINGLES
 
@@ -51,32 +50,6 @@ def test_a_copy_goes_on_with_the_same_bits(way, options, single, course, same):
     with pytest.raises(gym.error.ResetNeeded, match="the episode ended at"):
         ended.step(ended.action_space.low)
     assert same(course(ended, 80), course(env, 80))
-
-
-def test_a_copy_of_a_batch_goes_on_with_the_same_bits(batch_options, batch_course, same):
-    made = COPIERS["pickle"]
-    envs = PMAVectorEnv(17, randomisation="varied", **batch_options)
-    assert same(made(envs).reset(seed=3), envs.reset(seed=3))
-    ends = 0
-    for steps in (9, 40):
-        for seen in batch_course(envs, steps):
-            ends += int(np.sum(seen[2] | seen[3])) if len(seen) == 5 else 0
-        other = made(envs)
-        assert other.engine.threads == envs.engine.threads
-        ahead = batch_course(envs, 15)
-        assert same(batch_course(other, 15), ahead)
-        other.close()
-    assert ends > 5
-    envs.close()
-
-
-def test_a_batch_copied_where_episodes_have_just_ended_goes_on(batch, batch_course, same):
-    envs = batch(5)
-    envs.reset(seed=1)
-    while envs._waiting is None:
-        envs.step(np.full((5, 1), -0.8))
-    other = copy.deepcopy(envs)
-    assert same(batch_course(other), batch_course(envs))
 
 
 def test_pressures_of_each_are_copied(same):
@@ -130,23 +103,6 @@ def test_subclasses_keep_what_they_add(course, same):
 def test_tasks_pickle():
     for task in EVERY_TASK.values():
         assert pickle.loads(pickle.dumps(task)) == copy.deepcopy(task) == task
-
-
-def test_plants_and_what_controllers_get_pickle(single, same):
-    env = single({"randomisation": "varied", "model": "station"})
-    env.reset(seed=1)
-    env.step([0.1])
-    for made in (COPIERS["pickle"], copy.deepcopy, copy.copy):
-        plant = made(env.plant)
-        assert plant.model == env.plant.model and plant.tolerance == env.plant.tolerance
-        states, again = plant.settle(0.0, pressure=300e3), env.plant.settle(0.0, pressure=300e3)
-        np.testing.assert_array_equal(states.state, again.state)
-        assert made(env.station) == env.station and made(env.measurement) == env.measurement
-        assert made(env.options) == env.options and made(env.task) == env.task
-        assert made(env.events).step_times.size == 0
-        assert same(made(env.condition).state, env.condition.state)
-        assert made(env.table).describe() == env.table.describe()
-    assert pickle.loads(pickle.dumps(load_model("station"))) == load_model("station")
 
 
 def heavier(nominal, generator, most=1.0):

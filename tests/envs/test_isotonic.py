@@ -1,14 +1,12 @@
 """The regulator contracts the muscle against a constant load that the motor holds."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
-from pma_gym.envs import Measurement, PMAEnv
+from pma_gym.envs import PMAEnv
 from pma_gym.plant.model import load_model
 from pma_gym.plant.statics import contraction_at, muscle_force
-from pma_gym.tasks import ISOTONIC, TASKS, isotonic
+from pma_gym.tasks import ISOTONIC, isotonic
 
 FRICTIONLESS = load_model("serres2008").replace(
     {"coulomb_friction.static_n": 0.0, "coulomb_friction.dynamic_n": 0.0}
@@ -107,15 +105,6 @@ def test_the_triangles_are_the_dissertations_trials():
         np.testing.assert_allclose(turns, [0, 1, 0, 1, 0, 1, 0], atol=1e-12)
 
 
-def test_the_picture_names_the_regulator(make):
-    env = make("isotonic", render_mode="rgb_array", noise=False)
-    env.reset(seed=0)
-    first = env.render()
-    for _ in range(40):
-        env.step(env.action(7.0))
-    assert first is not None and np.any(env.render() != first)
-
-
 @pytest.mark.parametrize(
     ("task", "options", "words"),
     [
@@ -143,11 +132,3 @@ def test_a_load_that_nothing_balances_is_refused():
     possible = {"options": {"pressure_kpa": 550.0}}
     np.testing.assert_array_equal(env.reset(**possible)[0], whole.reset(seed=0)[0])
     np.testing.assert_array_equal(env.reset(**possible)[0], whole.reset()[0])
-
-
-def test_a_station_that_pulls_is_told_positions_as_before(make):
-    env = make("rotation")
-    env.reset(seed=0)
-    reading = Measurement(0.0, 1.0, 2.0, 3.0, 4.0)
-    assert env.station.position(reading) == 2.0 and env.station.load == 0.0
-    assert replace(env.station, task=TASKS["displacement"]).position(reading) == 1.0

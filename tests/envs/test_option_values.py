@@ -80,12 +80,6 @@ def test_numbers_of_steps_may_be_of_numpy():
     assert json.loads(envs.spec.to_json())["kwargs"]["max_episode_steps"] == 50
 
 
-def test_a_range_of_pressures_is_one_for_each():
-    envs = PMAVectorEnv(3, pressures_kpa=range(200, 401, 100))
-    envs.reset(seed=1)
-    np.testing.assert_allclose(envs.pressures, [200e3, 300e3, 400e3], rtol=1e-6)
-
-
 def test_arguments_of_a_batch_survive_json_too():
     envs = gym.make_vec(
         DISPLACEMENT, np.int64(3), threads=np.int32(1), autoreset_mode=AutoresetMode.SAME_STEP

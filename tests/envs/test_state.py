@@ -126,20 +126,6 @@ def test_a_batch_goes_on_from_its_state(batch_options, batch_course, same):
         one.close()
 
 
-def test_own_stations_are_kept_with_their_names(course, same):
-    def named(nominal, generator):
-        drawn = {"slide.mass_kg": 0.5 + generator.random()}
-        return nominal.replace(drawn, name=f"station {generator.integers(1000)}")
-
-    made = {"randomisation": named, "pressure_kpa": 300.0, "control_rate_hz": 10.0}
-    env, other = PMAEnv("displacement", **made), PMAEnv("displacement", **made)
-    env.reset(seed=1)
-    other.set_state(EnvState.from_json(env.get_state().to_json()))
-    assert other.plant.model == env.plant.model
-    assert other.plant.model.name.startswith("station ")
-    assert same(course(other), course(env))
-
-
 def test_a_batch_looks_ahead_from_where_one_environment_is(course, same):
     made = {"model": "station", "randomisation": "varied", "control_rate_hz": 10.0}
     env = PMAEnv("displacement", **made)

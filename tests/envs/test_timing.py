@@ -78,15 +78,6 @@ def test_samples_are_the_same_at_every_control_rate(make, follow, ramp, task, ra
         np.testing.assert_allclose(path, paths[0], rtol=0, atol=2e-6)
 
 
-def test_samples_at_the_ends_of_steps_are_the_states_there(make):
-    env = make(control_rate_hz=384.0 / 5.0)
-    env.reset(seed=0)
-    for _ in range(60):
-        env.step(env.action(2.0))
-        assert env.trajectory()[-1] == pytest.approx(env.truth["extension"], abs=1e-12)
-    assert len(env.trajectory()) == 301
-
-
 def test_rmse_is_that_of_the_trajectory(make, follow, ramp):
     env = make("rotation")
     info = follow(env, ramp)

@@ -125,12 +125,15 @@ def test_the_jacobian_is_that_of_a_tight_tolerance(measured, central):
     assert np.all(np.sum(slopes * truth, axis=1) / size / np.linalg.norm(slopes, axis=1) > 0.9998)
 
 
-def test_sums_are_those_of_residuals_and_their_derivatives(measured):
+@pytest.mark.parametrize("central", [False, True])
+def test_sums_are_those_of_residuals_and_their_derivatives(measured, central):
     some = Residuals(OFF, measured[:3], FREE)
     values, moves = some.start, 1e-3 * some.start
-    sums = some.sums(values, moves)
+    sums = some.sums(values, moves, central)
     r = np.concatenate([residuals.ravel() for residuals in some.each(values)])
-    j = np.concatenate([slopes.reshape(4, -1) for slopes in some.jacobian(values, moves)], axis=1)
+    j = np.concatenate(
+        [slopes.reshape(4, -1) for slopes in some.jacobian(values, moves, central)], axis=1
+    )
     assert sums.chi_square == pytest.approx(r @ r, rel=1e-12)
     np.testing.assert_allclose(sums.gradient, j @ r, rtol=1e-9)
     np.testing.assert_allclose(sums.curvature, j @ j.T, rtol=1e-9)
@@ -214,15 +217,6 @@ def test_what_the_trials_do_not_determine_has_no_error(measured):
     assert math.isinf(fitted.errors["limits.tension_n"]) and fitted.errors[FREE[0]] < 1.0
     alike = np.array([[4.0, 2.0, 0.0], [2.0, 1.0, 0.0], [0.0, 0.0, 2.0]])
     assert np.diag(inverse(alike)).tolist() == [math.inf, math.inf, 0.5]
-
-
-def test_steps_stay_within_their_bounds():
-    curvature, gradient = np.array([[2.0, 1.0], [1.0, 2.0]]), np.array([-3.0, 3.0])
-    low, high = np.full(2, -9.0), np.full(2, 9.0)
-    np.testing.assert_allclose(least(gradient, curvature, 0.0, low, high), [3.0, -3.0])
-    bound = least(gradient, curvature, 0.0, low, np.array([1.0, 9.0]))
-    np.testing.assert_allclose(bound, [1.0, -2.0])
-    np.testing.assert_allclose(least(gradient, curvature, 0.0, 0.0 * low, 0.0 * high), 0.0)
 
 
 @pytest.mark.parametrize(

@@ -1,8 +1,11 @@
 """Any bytes become a value or the reader's own ValueError: no traceback, no hang, no gigabytes.
 
 PMA_GYM_FUZZ_EXAMPLES sets how many inputs each reader gets; `make fuzz` gives many.
+
+Valid documents of every reader, and how a fuzzer changes them: values, keys, bytes.
 """
 
+import copy
 import json
 import os
 import tomllib
@@ -15,23 +18,174 @@ from hypothesis import strategies as st
 
 from benchmarks.runner.journal import case_rows
 from benchmarks.suites.frozen import parse_suite
-from benchmarks.training.preset import PresetError, load_preset
-from controllers.policies.document import PolicyError, parsed_document
+from benchmarks.training.preset import load_preset
+from controllers.policies.document import parsed_document
 from controllers.policies.tensors import check_header
 from pma_gym.data.datasets.dataset_toml import read_description
-from pma_gym.data.trial_columns import TrialError
 from pma_gym.documents import parse_json, parse_toml, parse_yaml
 from pma_gym.plant.model import ModelError, dump_model, load_model, shipped_models
-from tests.fuzz.documents import (
-    ODD_VALUES,
-    ROOT,
-    changed,
-    damaged,
-    places,
-    put,
-    toml_document,
-    without,
-)
+
+ROOT = Path(__file__).parents[2]
+HUGE = 10**400
+
+ODD_VALUES = [
+    0,
+    3,
+    -1,
+    1.5,
+    1e308,
+    float("inf"),
+    float("nan"),
+    HUGE,
+    "",
+    " ",
+    "text",
+    "\x1b[31mred",
+    "\ud800",
+    "‮",
+    "{{body}}",
+    "=1+1",
+    [],
+    [[]],
+    [1, "a"],
+    {},
+    {"a": 1},
+    {"value": []},
+    True,
+    False,
+    None,
+    "1_000",
+    "٣",
+    "x" * 3000,
+]
+"""What stands for a value of the wrong kind."""
+
+
+def places(document, front=()):
+    """Ways to every value of a document."""
+    if front:
+        yield front
+    pairs = (
+        document.items()
+        if isinstance(document, dict)
+        else enumerate(document)
+        if isinstance(document, list)
+        else ()
+    )
+    for key, value in list(pairs):
+        yield from places(value, (*front, key))
+
+
+def put(document, place, value):
+    """A copy of a document with another value at a place."""
+    changed = copy.deepcopy(document)
+    inside = changed
+    for key in place[:-1]:
+        inside = inside[key]
+    inside[place[-1]] = value
+    return changed
+
+
+def without(document, place):
+    """A copy of a document without the value at a place."""
+    changed = copy.deepcopy(document)
+    inside = changed
+    for key in place[:-1]:
+        inside = inside[key]
+    del inside[place[-1]]
+    return changed
+
+
+def toml(value):
+    """A value as TOML; None as a text, for TOML has none."""
+    if isinstance(value, bool):
+        return str(value).lower()
+    if value is None:
+        return '"null"'
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{toml(str(k))} = {toml(v)}" for k, v in value.items()) + "}"
+    if isinstance(value, list):
+        return "[" + ", ".join(map(toml, value)) + "]"
+    if isinstance(value, str):
+        # TOML refuses lone surrogates itself.
+        return json.dumps(value.encode("utf-8", "replace").decode())
+    return repr(value)
+
+
+def toml_document(document):
+    """A document as TOML, every table inline."""
+    return "".join(f"{toml(str(key))} = {toml(value)}\n" for key, value in document.items())
+
+
+@st.composite
+def changed(draw, documents):
+    """One of some documents with up to three values changed, removed, or doubled."""
+    document = draw(st.sampled_from(documents))
+    for _ in range(draw(st.integers(0, 3))):
+        every = list(places(document))
+        if not every:
+            break
+        place = draw(st.sampled_from(every))
+        how = draw(st.sampled_from(["odd", "odd", "number", "text", "remove"]))
+        if how == "remove":
+            document = without(document, place)
+            continue
+        value = draw(
+            {
+                "odd": st.sampled_from(ODD_VALUES),
+                "number": st.one_of(st.integers(), st.floats()),
+                "text": st.text(max_size=20),
+            }[how]
+        )
+        document = put(document, place, value)
+    return document
+
+
+@st.composite
+def damaged(draw, contents):
+    """One of some texts with bytes cut off, changed, doubled or glued."""
+    content = bytearray(draw(st.sampled_from(contents)))
+    for _ in range(draw(st.integers(0, 4))):
+        start = draw(st.integers(0, len(content)))
+        end = min(len(content), start + draw(st.integers(0, 40)))
+        how = draw(st.sampled_from(["cut", "remove", "replace", "double", "insert"]))
+        if how == "cut":
+            del content[start:]
+        elif how == "remove":
+            del content[start:end]
+        elif how == "double":
+            content[start:start] = content[start:end] * draw(st.integers(1, 50))
+        else:
+            new = draw(st.one_of(st.binary(max_size=12), st.sampled_from(TOKENS)))
+            content[start : end if how == "replace" else start] = new
+    return bytes(content)
+
+
+TOKENS = [
+    b"[" * 60,
+    b"{" * 60,
+    b"a." * 60,
+    b"9" * 500,
+    b'"""',
+    b"'''",
+    b"\\u0000",
+    b"\\ud800",
+    b"1e400",
+    b"NaN",
+    b"&a [*a]",
+    b"<<: *a",
+    b"!!python/object/apply:os.system [x]",
+    b"!!timestamp 1",
+    b"!!int x",
+    b"? [a]\n: b\n",
+    b"\xff\xfe",
+    b"\xef\xbb\xbf",
+    b"\r",
+    b"\x00",
+    b"1979-05-27T07:32:00Z",
+    b"0x" + b"f" * 500,
+    b"1:2:3:4",
+]
 
 EXAMPLES = int(os.environ.get("PMA_GYM_FUZZ_EXAMPLES", "15"))
 
@@ -108,33 +262,19 @@ def accepts(read, *given, error=ValueError):
     return True
 
 
+PARSERS = {
+    "toml": (parse_toml, MODELS),
+    "json": (parse_json, POLICIES),
+    "yaml": (parse_yaml, PRESETS),
+}
+
+
+@pytest.mark.parametrize("name", PARSERS)
 @fuzzed
-@given(damaged(MODELS) | st.binary(max_size=200))
-def test_toml(content):
-    accepts(parse_toml, content, "file.toml")
-
-
-@fuzzed
-@given(damaged(POLICIES) | st.binary(max_size=200))
-def test_json(content):
-    accepts(parse_json, content, "file.json")
-
-
-@fuzzed
-@given(damaged(PRESETS) | st.binary(max_size=200))
-def test_yaml(content):
-    accepts(parse_yaml, content, "file.yml")
-
-
-@fuzzed
-@given(changed(MODEL_TABLES))
-def test_models(tmp_path_factory, document):
-    path = _file(tmp_path_factory, "model.toml", toml_document(document).encode())
-    if accepts(load_model, path, error=ModelError):
-        # What is read can be written, and reads the same.
-        model = load_model(path)
-        path.write_text(dump_model(model), encoding="utf-8")
-        assert load_model(path).effects == model.effects
+@given(data=st.data())
+def test_bytes(name, data):
+    parse, sound = PARSERS[name]
+    accepts(parse, data.draw(damaged(sound) | st.binary(max_size=200)), f"file.{name}")
 
 
 @fuzzed
@@ -142,41 +282,6 @@ def test_models(tmp_path_factory, document):
 def test_bytes_of_models(tmp_path_factory, content):
     path = _file(tmp_path_factory, "model.toml", content)
     accepts(load_model, path, error=ModelError)
-
-
-@fuzzed
-@given(changed(DATASETS))
-def test_descriptions_of_data_sets(tmp_path_factory, document):
-    path = _file(tmp_path_factory, "dataset.toml", toml_document(document).encode())
-    accepts(read_description, path.parent, ["a.csv", "b.csv"], error=TrialError)
-
-
-@fuzzed
-@given(changed(SUITE_TABLES))
-def test_suites(document):
-    content = toml_document(document).encode()
-
-    def read():
-        parse_suite("mine.toml", parse_toml(content, "mine.toml"))
-
-    accepts(read, error=(ValueError, TypeError))
-
-
-@fuzzed
-@given(changed(PRESET_TABLES))
-def test_presets(tmp_path_factory, document):
-    content = yaml.safe_dump(document, allow_unicode=False).encode("utf-8", "replace")
-    path = _file(tmp_path_factory, "mine.yml", content)
-    for environment in ("pma_gym/IsokineticDisplacement-v0", "pma_gym/IsokineticExercise-v0"):
-        for algorithm in ("ppo", "sac"):
-            accepts(load_preset, str(path), algorithm, environment, error=PresetError)
-
-
-@fuzzed
-@given(changed(POLICY_TABLES))
-def test_policies(document):
-    content = json.dumps(document).encode()
-    accepts(parsed_document, content, error=PolicyError)
 
 
 @fuzzed
@@ -211,7 +316,10 @@ def _file(factory, name, content) -> Path:
 def _models(folder, document):
     path = folder / "model.toml"
     path.write_bytes(toml_document(document).encode())
-    load_model(path)
+    model = load_model(path)
+    # What is read can be written, and reads the same.
+    path.write_text(dump_model(model), encoding="utf-8")
+    assert load_model(path).effects == model.effects
 
 
 def _descriptions(folder, document):
@@ -234,19 +342,30 @@ def _policies(_, document):
 
 
 READERS = {
-    "model": (_models, MODEL_TABLES[0], 13),
-    "dataset.toml": (_descriptions, DATASETS[0], 1),
-    "suite": (_suites, min(SUITE_TABLES, key=lambda table: len(str(table))), 5),
+    "model": (_models, MODEL_TABLES, 13),
+    "dataset.toml": (_descriptions, DATASETS, 1),
+    "suite": (_suites, sorted(SUITE_TABLES, key=lambda table: len(str(table))), 5),
     # Of its first environment, the one that is read.
-    "preset": (_presets, dict(list(PRESET_TABLES[0].items())[:1]), 3),
-    "policy": (_policies, POLICY_TABLES[0], 7),
+    "preset": (_presets, [dict([*table.items()][:1]) for table in PRESET_TABLES], 3),
+    "policy": (_policies, POLICY_TABLES, 7),
 }
+"""What reads a document, sound ones, and every how many odd values a place gets."""
+
+
+@pytest.mark.parametrize("name", READERS)
+@fuzzed
+@given(data=st.data())
+def test_changed_documents(name, data, tmp_path_factory):
+    read, sound, _ = READERS[name]
+    path = _file(tmp_path_factory, "any", b"")
+    error = (ValueError, TypeError) if name == "suite" else ValueError
+    accepts(read, path.parent, data.draw(changed(sound)), error=error)
 
 
 @pytest.mark.parametrize("name", READERS)
 def test_no_value_of_a_wrong_kind_ends_in_a_traceback(name, tmp_path):
     """Every value of a sound document in turn, by every odd value, and left out."""
-    read, sound, step = READERS[name]
+    read, (sound, *_), step = READERS[name]
     read(tmp_path, sound)
     refused = 0
     for number, place in enumerate(places(sound)):

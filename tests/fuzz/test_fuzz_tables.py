@@ -13,7 +13,7 @@ import time
 import warnings
 import zipfile
 import zlib
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from unittest import mock
 
@@ -75,40 +75,43 @@ def text_seeds():
     return out
 
 
+def made_by(write):
+    """What a function writes to a file."""
+    file = io.BytesIO()
+    write(file)
+    return file.getvalue()
+
+
 @cache
 def binary_seeds(suffix):
     """Valid files of a format."""
     if suffix == ".mat":
         from scipy.io import savemat
 
-        out = []
-        for packed in (False, True):
-            for content in (columns(), {"log": columns()}, {"a": columns(), "b": columns()}):
-                made = io.BytesIO()
-                savemat(made, content, do_compression=packed)
-                out.append(made.getvalue())
-        return out
+        contents = columns(), {"log": columns()}, {"a": columns(), "b": columns()}
+        return [
+            made_by(lambda file, c=content, p=packed: savemat(file, c, do_compression=p))
+            for packed in (False, True)
+            for content in contents
+        ]
     if suffix in (".h5", ".73.mat"):
         return _hdf5_seeds(matlab=suffix == ".73.mat")
     if suffix == ".tdms":
-        nptdms = pytest.importorskip("nptdms")
-        out = []
-        for waveform in (False, True):
-            made = io.BytesIO()
-            with nptdms.TdmsWriter(made) as writer:
-                for _ in range(1 + waveform):
-                    writer.write_segment(
-                        [
-                            nptdms.ChannelObject(
-                                "log", name, values, properties={"wf_increment": 0.1}
-                            )
-                            for name, values in columns().items()
-                            if not waveform or name != "time_s"
-                        ]
-                    )
-            out.append(made.getvalue())
-        return out
+        return [made_by(partial(_tdms, waveform=waveform)) for waveform in (False, True)]
     return _written(suffix)
+
+
+def _tdms(file, waveform):
+    """Channels with a time beside them; else, in two segments, with a clock of their own."""
+    nptdms = pytest.importorskip("nptdms")
+    channels = [
+        nptdms.ChannelObject("log", name, values, properties={"wf_increment": 0.1})
+        for name, values in columns().items()
+        if not waveform or name != "time_s"
+    ]
+    with nptdms.TdmsWriter(file) as writer:
+        for _ in range(1 + waveform):
+            writer.write_segment(channels)
 
 
 def _hdf5_seeds(matlab):
@@ -163,15 +166,14 @@ def _parquet_seeds():
     import pyarrow
     from pyarrow import parquet
 
-    out = []
     texts = {name: list(map(str, values)) for name, values in columns().items()}
     stamps = pyarrow.array(range(0, ROWS * 10**5, 10**5), pyarrow.timestamp("us"))
-    for table in (columns(), texts, {**columns(), "time_s": stamps}):
-        for packed in ("none", "zstd"):
-            made = io.BytesIO()
-            parquet.write_table(pyarrow.table(table), made, compression=packed)
-            out.append(made.getvalue())
-    return out
+    tables = map(pyarrow.table, (columns(), texts, {**columns(), "time_s": stamps}))
+    return [
+        made_by(lambda file, t=table, p=packed: parquet.write_table(t, file, compression=p))
+        for table in tables
+        for packed in ("none", "zstd")
+    ]
 
 
 def change_bytes(rng, content):

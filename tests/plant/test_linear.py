@@ -10,6 +10,8 @@ from pma_gym.plant.forms.symbolic import symbolic
 from pma_gym.plant.model import load_model
 from pma_gym.plant.plant import Plant
 
+PLANT = Plant("serres2008")
+
 
 @pytest.mark.parametrize(
     ("model", "direction", "sign"),
@@ -55,9 +57,8 @@ def test_the_poles_of_the_cascade_are_those_of_eq_22():
 
 
 def test_the_stations_matrix_is_its_springs_dampers_and_masses():
-    plant = Plant("serres2008")
-    system = linearize(plant, 300e3, 0.02, "relaxing")
-    part = plant.model.parameters
+    system = linearize(PLANT, 300e3, 0.02, "relaxing")
+    part = PLANT.model.parameters
     at = {name: i for i, name in enumerate(system.state_labels)}
     mass, inertia, radius = part["slide"].mass, part["rotor"].inertia, part["rotor"].radius
     stiffness, cable = (32.7 - 0.0321 * 300.0) * 1e3, part["cable"].stiffness
@@ -89,15 +90,17 @@ def test_signals_have_names():
 
 
 def test_refusals_say_what_can_be_reached():
-    plant = Plant("serres2008")
-    with pytest.raises(ValueError, match=r"must lie in .* to 39.77 mm .* got 45 mm"):
-        linearize(plant, 300e3, 0.045)
-    with pytest.raises(ValueError, match=r"what a motor voltage of 0 to .* V holds"):
-        linearize(plant, 300e3, -0.05)
-    with pytest.raises(ValueError, match="pressure must lie in 0 to 578.6 kPa"):
-        linearize(plant, 700e3, 0.02)
-    with pytest.raises(ValueError, match="direction must be one of contracting, relaxing"):
-        linearize(plant, 300e3, 0.02, "sideways")
+    for message, act in (
+        (r"must lie in .* to 39.77 mm .* got 45 mm", lambda: linearize(PLANT, 300e3, 0.045)),
+        (r"what a motor voltage of 0 to .* V holds", lambda: linearize(PLANT, 300e3, -0.05)),
+        ("pressure must lie in 0 to 578.6 kPa", lambda: linearize(PLANT, 700e3, 0.02)),
+        (
+            "direction must be one of contracting, relaxing",
+            lambda: linearize(PLANT, 300e3, 0.02, "sideways"),
+        ),
+    ):
+        with pytest.raises(ValueError, match=message):
+            act()
 
 
 def numerical(plant, rates):
@@ -151,8 +154,7 @@ def test_the_equations_read_well():
 
 
 def test_a_plant_gives_both_itself():
-    plant = Plant("serres2008")
-    system = plant.linearize(300e3, 0.025)
-    np.testing.assert_array_equal(system.A, linearize(plant, 300e3, 0.025).A)
+    system = PLANT.linearize(300e3, 0.025)
+    np.testing.assert_array_equal(system.A, linearize(PLANT, 300e3, 0.025).A)
     assert system.input_labels == ["motor_voltage", "regulator_voltage"]
-    assert list(plant.symbolic()) == plant.states
+    assert list(PLANT.symbolic()) == PLANT.states

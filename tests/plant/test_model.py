@@ -1,4 +1,7 @@
-"""Models: read, written, changed, copied; and what is said about a broken one."""
+"""Models: read, written, changed, copied; and what is said about a broken one.
+
+Effects of the catalogue added to a model.
+"""
 
 import copy
 import pickle
@@ -19,6 +22,12 @@ from pma_gym.plant.model import (
 from pma_gym.plant.parameter_rows import Note
 
 SHIPPED = sorted(shipped_models())
+
+
+STATION = load_model("station")
+
+
+SERRES = load_model("serres2008")
 
 
 @pytest.mark.parametrize("name", SHIPPED)
@@ -44,87 +53,70 @@ def test_every_number_of_a_shipped_model_has_a_source(name):
 
 
 def test_intervals_contain_their_values():
-    model = load_model("station")
-    known = {path: note for path, note in model.notes.items() if note.low is not None}
+    known = {path: note for path, note in STATION.notes.items() if note.low is not None}
     assert known
     for path, note in known.items():
         effect, _, name = path.partition(".")
-        assert note.low < model.values_in_files(effect)[name] < note.high
+        assert note.low < STATION.values_in_files(effect)[name] < note.high
 
 
 def test_the_literatures_models_differ_from_serres2008_in_the_muscle_alone():
-    base = load_model("serres2008")
     for name in set(SHIPPED) - {"serres2008", "station", "cascade"}:
         model = load_model(name)
         for effect, values in model.parameters.items():
             if CATALOGUE[effect].port not in ("muscle_force", "muscle_damping"):
                 kept = values._replace(**({"contraction": 0.07} if effect == "limits" else {}))
-                assert kept == base.parameters[effect]
+                assert kept == SERRES.parameters[effect]
 
 
 def test_copies_and_pickles_are_equal():
-    model = load_model("station")
-    for other in (copy.deepcopy(model), pickle.loads(pickle.dumps(model))):
-        assert other.parameters == model.parameters
-        assert dict(other.notes) == dict(model.notes)
-        assert other.name == model.name
+    for other in (copy.deepcopy(STATION), pickle.loads(pickle.dumps(STATION))):
+        assert other.parameters == STATION.parameters
+        assert dict(other.notes) == dict(STATION.notes)
+        assert other.name == STATION.name
         assert isinstance(other.parameters, MappingProxyType)
-        np.testing.assert_array_equal(other.vector(), model.vector())
+        np.testing.assert_array_equal(other.vector(), STATION.vector())
 
 
 def test_a_model_cannot_be_changed_in_place():
-    model = load_model("serres2008")
     with pytest.raises(TypeError):
-        model.parameters["drive"] = None  # type: ignore[index]
+        SERRES.parameters["drive"] = None  # type: ignore[index]
     with pytest.raises(AttributeError):
-        model.parameters["drive"].gain = 1.0
+        SERRES.parameters["drive"].gain = 1.0
     with pytest.raises(AttributeError):
-        model.name = "other"  # type: ignore[misc]
+        SERRES.name = "other"  # type: ignore[misc]
 
 
 def test_replace_changes_what_is_named_and_nothing_else():
-    model = load_model("station")
-    other = model.replace({"drive.gain_n_per_v": 100.0, "cable.slack_mm": 2.0}, name="tuned")
+    other = STATION.replace({"drive.gain_n_per_v": 100.0, "cable.slack_mm": 2.0}, name="tuned")
     assert other.name == "tuned"
     assert other.parameters["drive"].gain == 100.0
     assert other.parameters["cable"].slack == pytest.approx(2e-3, rel=1e-15)
-    assert other.parameters["drive"].offset == model.parameters["drive"].offset
+    assert other.parameters["drive"].offset == STATION.parameters["drive"].offset
     changed = {
-        name for name in model.parameters if model.parameters[name] != other.parameters[name]
+        name for name in STATION.parameters if STATION.parameters[name] != other.parameters[name]
     }
     assert changed == {"drive", "cable"}
     assert "drive.gain_n_per_v" not in other.notes
-    assert other.notes["drive.offset_n"] == model.notes["drive.offset_n"]
-    assert model.replace({}).parameters == model.parameters
+    assert other.notes["drive.offset_n"] == STATION.notes["drive.offset_n"]
+    assert STATION.replace({}).parameters == STATION.parameters
 
 
 def test_replace_refuses_what_it_does_not_know_or_may_not_be():
-    model = load_model("serres2008")
     with pytest.raises(
         ModelError, match=r"no parameter drive\.gain; did you mean drive.gain_n_per"
     ):
-        model.replace({"drive.gain": 1.0})
+        SERRES.replace({"drive.gain": 1.0})
     with pytest.raises(ModelError, match=r"drive\.gain_n_per_v must lie in 1 to 1000 N/V, got 0"):
-        model.replace({"drive.gain_n_per_v": 0})
+        SERRES.replace({"drive.gain_n_per_v": 0})
     with pytest.raises(ModelError, match=r"must be a number in N/V, got 'strong'"):
-        model.replace({"drive.gain_n_per_v": "strong"})  # type: ignore[dict-item]
-
-
-def test_numbers_at_their_bounds_survive_replacement():
-    model = load_model("serres2008")
-    for effect in model.effects.values():
-        for stem, quantity in effect.quantities.items():
-            path = f"{effect.name}.{quantity.name(stem)}"
-            for bound in (quantity.lower, quantity.upper):
-                model = model.replace({path: bound})
-                assert model.replace({}).parameters == model.parameters
+        SERRES.replace({"drive.gain_n_per_v": "strong"})  # type: ignore[dict-item]
 
 
 def test_text_with_any_character_survives():
-    base = load_model("serres2008")
     title = 'a "quoted" \\ title,\nof two lines, µ\t.'
     notes = {"drive.offset_n": Note('by "hand"', -1.0, 2.5)}
-    model = Model(base.name, title, base.plant, base.parameters, notes)
+    model = Model(SERRES.name, title, SERRES.plant, SERRES.parameters, notes)
     import tomllib
 
     again = parse_model(tomllib.loads(dump_model(model)))
@@ -132,7 +124,7 @@ def test_text_with_any_character_survives():
     assert again.notes["drive.offset_n"] == notes["drive.offset_n"]
 
 
-GOOD = dump_model(load_model("serres2008"))
+GOOD = dump_model(SERRES)
 CASCADE = dump_model(load_model("cascade"))
 
 
@@ -291,10 +283,59 @@ def test_a_path_that_leads_to_no_model_file_is_said_to_be_that(tmp_path, monkeyp
 
 
 def test_a_model_built_in_code_is_checked_as_a_file_is():
-    base = load_model("serres2008")
-    parameters = dict(base.parameters)
+    parameters = dict(SERRES.parameters)
     parameters["sarosi_forse"] = parameters["drive"]
     with pytest.raises(
         ModelError, match=r"unknown effect \[sarosi_forse\]; did you mean \[sarosi_"
     ):
         Model("mine", "", "station", parameters)
+
+
+def test_names_add_what_is_there_and_does_nothing():
+    more = SERRES.with_effects(["regulator_asymmetry", "hysteresis"])
+    assert set(more.parameters) - set(SERRES.parameters) == {"hysteresis", "regulator_asymmetry"}
+    for name in ("hysteresis", "regulator_asymmetry"):
+        assert more.parameters[name] == CATALOGUE[name].neutral
+    assert list(more.parameters) == [name for name in CATALOGUE if name in more.parameters]
+    assert dict(more.notes) == dict(SERRES.notes) and more.name == SERRES.name
+
+
+def test_the_order_given_does_not_matter():
+    names = ["hand_push", "hysteresis", "regulator_asymmetry"]
+    assert dump_model(SERRES.with_effects(names)) == dump_model(SERRES.with_effects(names[::-1]))
+
+
+def test_values_are_given_as_in_files_and_the_rest_is_neutral():
+    more = SERRES.with_effects({"hysteresis": {"force_n": 12.0}}, name="sticky")
+    assert more.name == "sticky"
+    assert more.parameters["hysteresis"].force == 12.0
+    assert more.parameters["hysteresis"].distance == CATALOGUE["hysteresis"].neutral.distance
+
+
+def test_what_a_model_has_stays_to_the_last_bit():
+    again = STATION.with_effects(["hysteresis", "sarosi_force", "cable"])
+    assert again == STATION and again.vector().tobytes() == STATION.vector().tobytes()
+    changed = STATION.with_effects({"hysteresis": {"force_n": 9.0}})
+    assert changed.parameters["hysteresis"].distance == STATION.parameters["hysteresis"].distance
+    assert "hysteresis.force_n" not in changed.notes
+    assert changed.notes["hysteresis.distance_mm"] == STATION.notes["hysteresis.distance_mm"]
+
+
+@pytest.mark.parametrize(
+    ("effects", "words"),
+    [
+        (["hysteresys"], ["unknown effect [hysteresys]", "did you mean [hysteresis]?"]),
+        ({"hysteresis": {"force": 1.0}}, ["[hysteresis]", "force;", "force_n, distance_mm"]),
+        ({"hysteresis": {"force_n": 1e3}}, ["hysteresis.force_n", "0 to 200 N", "1000"]),
+        ({"hysteresis": {"force_n": "much"}}, ["hysteresis.force_n", "number in N", "'much'"]),
+        (["position_map"], ["[position_map]", "no neutral values", "pressure_kpa"]),
+        (["servo"], ["[servo]", "no neutral values", "give stiffness_n_m"]),
+        ({"servo_inertia": {"inertia_kg_m2": 1e-3, "damping_ratio": 0.7}}, ["port servo_inertia"]),
+        ("hysteresis", ["a list of names or a dict", "'hysteresis'"]),
+    ],
+)
+def test_mistakes_are_named(effects, words):
+    with pytest.raises(ModelError) as caught:
+        SERRES.with_effects(effects)
+    for word in words:
+        assert word in str(caught.value)

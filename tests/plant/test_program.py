@@ -1,4 +1,7 @@
-"""Compiled plants: one program a structure, any parameters, any number of trials at once."""
+"""Compiled plants: one program a structure, any parameters, any number of trials at once.
+
+The step in plain Python: what is compiled, to be read and debugged.
+"""
 
 import os
 import subprocess
@@ -7,9 +10,9 @@ import sys
 import numpy as np
 import pytest
 
-from pma_gym.codegen.machine import native
-from pma_gym.codegen.machine.native import Library, compiled, simd_lanes
+from pma_gym.codegen.machine.native import compiled, simd_lanes
 from pma_gym.plant import program as program_module
+from pma_gym.plant.forms.plain import PlainPlant
 from pma_gym.plant.model import load_model
 from pma_gym.plant.plant import Plant
 from pma_gym.plant.simulation import FEW, Batch, Run, simulate_all, simulate_batches
@@ -79,22 +82,6 @@ def _columns(rows, seed):
     generator = np.random.default_rng(seed)
     motor, regulator = generator.uniform(0.0, 6.0, rows), generator.uniform(4.0, 8.0, rows)
     return np.cumsum(generator.uniform(0.002, 0.02, rows)), motor, regulator
-
-
-def test_few_passes_of_the_compiler_give_the_bits_of_all(monkeypatch):
-    def thorough(key, build, name, brief):
-        return Library.from_object(native.object_code(str(build())), name)
-
-    brief = Plant("serres2008").program
-    monkeypatch.setattr(program_module, "compiled", thorough)
-    monkeypatch.setattr(native, "_PASSES", None)
-    full = program_module.Program(brief.model)
-    for count in (2, 9):
-        runs, others = trials(count, "serres2008"), trials(count, "serres2008")
-        simulate_all(brief, runs)
-        simulate_all(full, others)
-        for one, other in zip(runs, others, strict=True):
-            np.testing.assert_array_equal(one.states, other.states)
 
 
 def test_only_what_is_asked_for_is_compiled(monkeypatch):
@@ -187,3 +174,49 @@ def test_the_cache_is_where_it_was_asked_for_is_used_again_and_loads_nothing_hea
     assert kept
     assert run(code, PMA_GYM_CACHE=str(folder))[0].split() == ["True", "[]"]
     assert sorted(path for path in folder.rglob("*") if path.is_file()) == kept
+
+
+MODELS = ("serres2008", "station", "cascade")
+
+
+@pytest.fixture(scope="module", params=MODELS)
+def both(request):
+    plant = Plant(request.param)
+    return plant, PlainPlant(plant)
+
+
+def test_rates_have_the_same_bits(both):
+    plant, plain = both
+    rest, generator = plant.settle(3.0, 330e3), np.random.default_rng(3)
+    for _ in range(20):
+        state = rest.state * (1.0 + 0.05 * generator.standard_normal(rest.state.shape))
+        state += 1e-3 * generator.standard_normal(rest.state.shape)
+        given = (state, *generator.uniform(0.0, 10.0, 2), rest.zero_contraction)
+        np.testing.assert_array_equal(plain.derivative(*given), plant.derivative(*given))
+
+
+def test_the_attempts_are_the_compiled_ones(both):
+    plant, plain = both
+    slow, fast = plant.settle(1.0, 350e3), plant.settle(1.0, 350e3)
+    size = np.abs(fast.state) + 1e-6
+    for motor in (1.5, 5.0, 0.3, 4.0):
+        for _ in range(3):
+            attempts = plain.attempts(slow, motor, 6.0, 0.01)
+            lengths = [made.length for made in attempts if made.accepted]
+            plant.step(fast, motor, 6.0, 0.01)
+            assert sum(lengths) == pytest.approx(0.01, rel=1e-12)
+            assert slow.time == pytest.approx(fast.time, rel=1e-12)
+            # The same sizes, and so the same attempts.
+            assert slow.size == pytest.approx(fast.size, rel=1e-5)
+            size = np.maximum(size, np.abs(fast.state))
+            assert np.all(np.abs(slow.state - fast.state) <= 1e-7 * size)
+
+
+def test_the_text_is_plain_readable_python(both):
+    _, plain = both
+    compile(plain.text, "plain", "exec")
+    for name in ("rates", "attempt"):
+        assert f"def {name}(" in plain.text
+        assert callable(getattr(plain.module, name))
+    lines = plain.text.splitlines()
+    assert max(len(line) for line in lines if not line.startswith(("def", "    return"))) < 200

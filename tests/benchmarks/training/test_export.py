@@ -36,7 +36,7 @@ from controllers.policy import Policy
 from pma_gym.envs import StationInfo
 from pma_gym.plant.model import load_model
 from pma_gym.tasks import TASKS
-from tests.controllers.drawn_policies import drawn_policy
+from tests.controllers.policies.test_network import drawn_policy
 
 DISPLACEMENT = "pma_gym/IsokineticDisplacement-v0"
 AGREEMENT = 1e-6

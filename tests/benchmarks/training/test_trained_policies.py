@@ -14,7 +14,7 @@ from benchmarks.training.train_policies import save_policy, train_words
 from controllers.policies.policy_file import load_policy_file, save_policy_file
 from controllers.policy import shipped_policies
 from pma_gym.envs import PMAEnv
-from tests.controllers.drawn_policies import drawn_policy
+from tests.controllers.policies.test_network import drawn_policy
 
 
 @pytest.fixture(scope="module")

@@ -1,4 +1,7 @@
-"""What a policy sees is what the table says, and its action is the voltage that the form says."""
+"""What a policy sees is what the table says, and its action is the voltage that the form says.
+
+What a policy sees of an exercise, by hand.
+"""
 
 import math
 
@@ -11,6 +14,7 @@ from controllers.policies.observation_spec import ObservationSpec
 from pma_gym.envs import Measurement, PMAEnv, StationInfo
 from pma_gym.plant.model import load_model
 from pma_gym.tasks import named_task
+from pma_gym.units import SI_FACTORS
 
 RATE = {"control_rate_hz": 20.0, "pressure_kpa": 300.0}
 OBSERVED = {
@@ -166,6 +170,10 @@ FORMS = {
         ActionMapping("residual", 3.0, "pid"),
         [(0.0, 4.0), (1.0, 7.0), (-1.0, 1.0), (-5.0, 1.0), (0.5, 5.5)],
     ),
+    "residual beyond the range": (
+        ActionMapping("residual", 10.0, "pid"),
+        [(1.0, 10.0), (-1.0, 0.0)],
+    ),
 }
 
 
@@ -173,33 +181,12 @@ FORMS = {
 def test_actions_become_volts(kind):
     form, pairs = FORMS[kind]
     pilot = PolicyAdapter(
-        ObservationSpec("tracking", 0, 1), form, Base() if kind == "residual" else None
+        ObservationSpec("tracking", 0, 1), form, Base() if form.kind == "residual" else None
     )
     pilot.reset(line, station_of())
     for step, (action, volts) in enumerate(pairs):
         pilot.update(Measurement(0.1 * step, 0.0, 0.0, 0.0, 300e3), 0.1 * step)
         assert pilot.volts(action) == pytest.approx(volts, abs=1e-12)
-
-
-def test_a_residuals_sum_is_held_to_the_range():
-    pilot = PolicyAdapter(
-        ObservationSpec("tracking", 0, 0), ActionMapping("residual", 10.0, "pid"), Base()
-    )
-    pilot.reset(line, station_of())
-    reading = Measurement(0.0, 0.0, 0.0, 0.0, 300e3)
-    pilot.update(reading, 0.0)
-    assert pilot.volts(1.0) == 10.0
-    assert pilot.update(reading, 0.1)[-1] == pytest.approx(-5.0)
-    assert pilot.volts(-1.0) == 0.0
-
-
-def test_a_regulators_first_voltage_holds_the_pressure():
-    station = station_of("isotonic")
-    pilot = PolicyAdapter(ObservationSpec("tracking", 0, 0), ActionMapping("increment", 0.5))
-    pilot.reset(line, station)
-    pilot.update(Measurement(0.0, 0.0, 0.0, 0.0, 300e3), 0.0)
-    rest = nominal_offset(station)
-    assert 1.0 < rest < 9.0 and pilot.volts(0.0) == pytest.approx(rest)
 
 
 # -- no numbers ------------------------------------------------------------------------------------
@@ -224,3 +211,42 @@ def test_a_reading_that_is_no_number_is_named(part, kind):
     with pytest.raises(ValueError, match=f"{part} is nan.*check the sensor"):
         pilot.update(bad, 0.0)
     assert np.isfinite(pilot.update(Measurement(0.0, 0.0, 0.0, 0.0, 300e3), 0.0)).all()
+
+
+DEG = SI_FACTORS["deg"]
+
+
+def exercise_view(task, reading, time):
+    """Entries of a pilot's first view by name."""
+    station = StationInfo(load_model("station"), named_task(task), 400e3, 0.01)
+    view = ObservationSpec("tracking", 1, 0)
+    pilot = PolicyAdapter(view, ActionMapping("increment", 0.5))
+    pilot.reset(station.task.schedule.at, station)
+    names = [name for name, _ in view.rows(station)]
+    entries = pilot.update(reading, time).tolist()
+    # The regulator rests where it holds the trial's pressure.
+    assert pilot.volts(0.0) == pytest.approx(nominal_offset(station))
+    return dict(zip(names, entries, strict=True))
+
+
+def test_an_exercise_of_one_speed_sees_both_angles_and_the_load():
+    radius = load_model("station").parameters["rotor"].radius
+    reading = Measurement(1.0, 18.9 * DEG * radius, 14.4 * DEG, 300.0, 350e3)
+    observation = exercise_view("isokinetic_exercise", reading, 1.0)
+    assert observation["reference now"] == pytest.approx(0.2)
+    # 18 deg/s for 10 ms is 0.18 deg.
+    assert observation["reference 1 ahead less reference now, over 1"] == pytest.approx(0.2)
+    assert observation["reference less measured position"] == pytest.approx(1.0)
+    assert observation["reference less position by the other sensor"] == pytest.approx(-1.0)
+    assert observation["pressure less pressure at the trial's start"] == pytest.approx(-0.5)
+    assert observation["load"] == pytest.approx(1.5)
+
+
+@pytest.mark.parametrize("angle, prescribed", [(0.0, 4.0), (15.0, 6.0), (60.0, 9.0), (100.0, 7.5)])
+def test_a_prescribed_moment_is_compared_at_the_angle(angle, prescribed):
+    radius = load_model("station").parameters["rotor"].radius
+    reading = Measurement(0.0, 0.0, angle * DEG, (prescribed + 0.72) / radius, 400e3)
+    observation = exercise_view("profile_exercise", reading, 0.0)
+    # 4 % of the greatest moment, 9 N m, is 0.36 N m.
+    assert observation["prescribed less measured moment"] == pytest.approx(-2.0, abs=1e-5)
+    assert observation["measured rotation"] == pytest.approx(angle / 90.0)

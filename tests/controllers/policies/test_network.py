@@ -1,12 +1,65 @@
-"""A network computes its equations, and the same bits for an observation alone or among many."""
+"""A network computes its equations, and the same bits for an observation alone or among many.
+
+Policies that nobody trained: networks drawn at random, with the words of a real one.
+"""
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from controllers.policies.adapter import ActionMapping
 from controllers.policies.network import ACTIVATIONS, OUTPUTS, Layer, Network, Scaling, Weights
-from tests.controllers.drawn_policies import drawn_weights
+from controllers.policies.observation_spec import ObservationSpec
+from controllers.policies.policy_file import PolicyFile
+
+
+def drawn_weights(sizes=(48, 64, 64, 1), activation="tanh", output="clip", scaled=False, seed=0):
+    draw = np.random.default_rng(seed)
+    layers = tuple(
+        Layer(
+            (draw.normal(size=(outputs, inputs)) / np.sqrt(inputs)).astype(np.float32),
+            draw.normal(size=outputs).astype(np.float32) * np.float32(0.1),
+        )
+        for inputs, outputs in zip(sizes, sizes[1:], strict=False)
+    )
+    scaling = Scaling(draw.normal(size=sizes[0]), draw.uniform(0.1, 4.0, sizes[0]), 1e-8, 10.0)
+    return Weights(layers, activation, output, scaling if scaled else None)
+
+
+def drawn_policy(station, name="displacement-100hz-ppo", view=None, form=None, **network):
+    """A policy as if trained for a station."""
+    view, form = view or ObservationSpec("environment", 2, 3), form or ActionMapping("direct", 5.0)
+    rows = view.rows(station, form.base)
+    return PolicyFile(
+        name=name,
+        title="PPO",
+        weights=drawn_weights((len(rows), 64, 64, 1), **network),
+        task="displacement",
+        environment={
+            "id": "pma_gym/IsokineticDisplacement-v0",
+            "kwargs": {
+                "control_rate_hz": 1.0 / station.period,
+                "action_delay_s": station.action_delay,
+                "observation_delay_s": station.observation_delay,
+                "model": station.model.name,
+            },
+        },
+        view=view,
+        observation=tuple(rows),
+        form=form,
+        training={
+            "algorithm": "ppo",
+            "preset": None,
+            "seed": 1,
+            "steps": 1000,
+            "wall_s": 2.5,
+            "code": None,
+            "curve": [[500, 1.25, 0.4], [1000, 2.5, 0.2]],
+            "scores": {"rmse_mm": 0.2},
+        },
+    )
+
 
 EVERY = [(a, o, s) for a in ACTIVATIONS for o in OUTPUTS for s in (False, True)]
 
@@ -31,7 +84,7 @@ def test_the_equations(activation, output, scaled):
 @given(count=st.integers(0, 7), seed=st.integers(0, 99), start=st.integers(0, 3))
 def test_alone_or_among_many_are_the_same_bits(count, seed, start):
     draw = np.random.default_rng(seed)
-    weights = _weights(draw)
+    weights = drawn_weights(output="tanh", seed=seed)
     # Rows at every alignment that a slice of somebody's array may have.
     memory = draw.normal(size=count * 48 + start).astype(np.float32)[start:]
     rows = memory.reshape(count, 48)
@@ -39,15 +92,6 @@ def test_alone_or_among_many_are_the_same_bits(count, seed, start):
     alone = [Network(weights)(row.copy()) for row in rows]
     assert many.shape == (count, 1)
     assert many.tobytes() == b"".join(one.tobytes() for one in alone)
-
-
-def _weights(draw):
-    sizes = (48, 64, 64, 1)
-    layers = [
-        Layer(draw.normal(size=(n, m)).astype(np.float32), draw.normal(size=n).astype(np.float32))
-        for m, n in zip(sizes, sizes[1:], strict=False)
-    ]
-    return Weights(tuple(layers), "tanh", "tanh")
 
 
 def test_what_it_gave_stays():

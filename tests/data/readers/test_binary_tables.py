@@ -45,6 +45,21 @@ def hdf5(tmp_path):
     return lambda name="a.h5", mode="w", **options: h5py.File(tmp_path / name, mode, **options)
 
 
+@pytest.fixture
+def a_mat(tmp_path):
+    return tmp_path / "a.mat"
+
+
+@pytest.fixture
+def a_tdms(tmp_path):
+    return tmp_path / "a.tdms"
+
+
+@pytest.fixture
+def a_parquet(tmp_path):
+    return tmp_path / "a.parquet"
+
+
 def refused(path, **kwargs):
     with pytest.raises(TrialError) as caught:
         read_trial(path, **kwargs)
@@ -65,44 +80,40 @@ def test_vectors_of_a_mat_file_are_columns(tmp_path, options):
 
 
 @pytest.mark.parametrize("kind", ["f4", "i2", "u1", "i8", "u4"])
-def test_any_numbers_of_a_mat_file_are_read_as_scipy_reads_them(tmp_path, kind):
-    path = tmp_path / "a.mat"
+def test_any_numbers_of_a_mat_file_are_read_as_scipy_reads_them(a_mat, kind):
     columns = {name: np.round(9 * values).astype(kind) for name, values in COLUMNS.items()}
     columns["time_s"] = np.arange(ROWS).astype(kind)
-    savemat(path, columns, oned_as="row")
-    trial = read_trial(path)
-    assert_array_equal(trial.time, loadmat(path)["time_s"][0])
-    there = loadmat(path)["contraction_mm"][0]
+    savemat(a_mat, columns, oned_as="row")
+    trial = read_trial(a_mat)
+    assert_array_equal(trial.time, loadmat(a_mat)["time_s"][0])
+    there = loadmat(a_mat)["contraction_mm"][0]
     assert_allclose(trial.measurements["contraction"] * 1e3, there, rtol=1e-15)
 
 
-def test_structures_of_a_mat_file_are_trials(tmp_path):
-    path = tmp_path / "a.mat"
-    savemat(path, {"log": {**COLUMNS, "about": {"rig": 2.0}}})
-    check(read_trial(path))
-    savemat(path, {"ramp": COLUMNS, "step": SHORT, "many": np.array([COLUMNS, SHORT], object)})
-    assert "a.mat holds 2 trials: 'a.mat#ramp', 'a.mat#step'" in refused(path)
-    check(read_trial(f"{path}#step"), SHORT)
+def test_structures_of_a_mat_file_are_trials(tmp_path, a_mat):
+    savemat(a_mat, {"log": {**COLUMNS, "about": {"rig": 2.0}}})
+    check(read_trial(a_mat))
+    savemat(a_mat, {"ramp": COLUMNS, "step": SHORT, "many": np.array([COLUMNS, SHORT], object)})
+    assert "a.mat holds 2 trials: 'a.mat#ramp', 'a.mat#step'" in refused(a_mat)
+    check(read_trial(f"{a_mat}#step"), SHORT)
     with pytest.warns(TrialWarning, match="'many' is passed over: a cell array"):
         assert len(read_dataset(tmp_path)) == 2
     rows = [tuple(columns.values()) for columns in (COLUMNS, SHORT)]
-    savemat(path, {"runs": np.array(rows, [(name, object) for name in COLUMNS])})
-    check(read_trial(f"{path}#runs_2"), SHORT)
+    savemat(a_mat, {"runs": np.array(rows, [(name, object) for name in COLUMNS])})
+    check(read_trial(f"{a_mat}#runs_2"), SHORT)
 
 
-def test_a_matrix_needs_names_and_takes_them(tmp_path):
-    path = tmp_path / "a.mat"
-    savemat(path, {"data": np.column_stack(list(COLUMNS.values()))})
-    assert "a.mat holds 'data', but no vectors of one length with a name each" in refused(path)
-    check(read_trial(path, form=FileFormat(names=tuple(COLUMNS))))
+def test_a_matrix_needs_names_and_takes_them(a_mat):
+    savemat(a_mat, {"data": np.column_stack(list(COLUMNS.values()))})
+    assert "a.mat holds 'data', but no vectors of one length with a name each" in refused(a_mat)
+    check(read_trial(a_mat, form=FileFormat(names=tuple(COLUMNS))))
 
 
-def test_own_names_of_a_mat_file_are_mapped(tmp_path):
-    path = tmp_path / "a.mat"
+def test_own_names_of_a_mat_file_are_mapped(a_mat):
     names = dict(zip(("t", "U", "x"), COLUMNS, strict=True))
-    savemat(path, {own: COLUMNS[ours] for own, ours in names.items()})
-    check(read_trial(path, names))
-    assert "a.mat has no column time_s; its columns are 't', 'U', 'x'" in refused(path)
+    savemat(a_mat, {own: COLUMNS[ours] for own, ours in names.items()})
+    check(read_trial(a_mat, names))
+    assert "a.mat has no column time_s; its columns are 't', 'U', 'x'" in refused(a_mat)
 
 
 def element(kind, body):
@@ -143,10 +154,9 @@ DAMAGED = "a.mat cannot be read: damaged or not what its name says ("
         (element(14, bytes(20))[:-4], DAMAGED),
     ],
 )
-def test_a_mat_file_that_cannot_be_used_is_named_and_passed_over(tmp_path, content, message):
-    path = tmp_path / "a.mat"
-    path.write_bytes(MAT + content)
-    assert message in refused(path)
+def test_a_mat_file_that_cannot_be_used_is_named_and_passed_over(tmp_path, a_mat, content, message):
+    a_mat.write_bytes(MAT + content)
+    assert message in refused(a_mat)
     savemat(tmp_path / "b.mat", COLUMNS)
     with pytest.warns(TrialWarning, match="a file is passed over: a.mat"):
         assert [each.name for each in read_dataset(tmp_path).trials] == ["b.mat"]
@@ -185,15 +195,14 @@ def test_a_mat_file_without_end_is_refused(tmp_path, monkeypatch, made, limit, n
     assert message in refused(tmp_path / "a.mat")
 
 
-def test_every_vector_that_is_passed_over_is_named(tmp_path):
-    path = tmp_path / "a.mat"
+def test_every_vector_that_is_passed_over_is_named(a_mat):
     others = {
         "slow": TIME[:9], "waves": np.exp(1j * TIME), "parts": np.array([TIME, 1.0], object),
         "grid": np.ones((4, 5)), "sensor": {"scale": np.arange(5.0)}, "who": "N. N.", "fs": 50.0,
     }  # fmt: skip
-    savemat(path, {"log": {**COLUMNS, **others}}, oned_as="row")
+    savemat(a_mat, {"log": {**COLUMNS, **others}}, oned_as="row")
     with pytest.warns(TrialWarning) as said:
-        check(read_trial(path))
+        check(read_trial(a_mat))
     assert sorted(str(each.message) for each in said) == [
         "a.mat: 'log.grid' is passed over: a matrix of 4 x 5, whose columns have no names",
         "a.mat: 'log.parts' is passed over: a cell array",
@@ -285,11 +294,10 @@ def test_frames_of_pandas_are_read_and_their_pickles_are_not_loaded(tmp_path, hd
         check(read_trial(path))
 
 
-def test_structure_arrays_of_version_73_are_trials(tmp_path, hdf5):
+def test_structure_arrays_of_version_73_are_trials(a_mat, hdf5):
     import h5py
 
-    path = tmp_path / "a.mat"
-    with hdf5(path.name, userblock_size=512) as out:
+    with hdf5(a_mat.name, userblock_size=512) as out:
         out.create_group("run").attrs["MATLAB_class"] = np.bytes_(b"struct")
         for name in COLUMNS:
             refs = np.zeros((2, 1), h5py.ref_dtype)
@@ -300,9 +308,9 @@ def test_structure_arrays_of_version_73_are_trials(tmp_path, hdf5):
         assert not out.create_dataset("run/notes", (2, 1), h5py.ref_dtype)[0, 0]
         out["cells"] = refs
         out["cells"].attrs["MATLAB_class"] = np.bytes_(b"cell")
-    check(read_trial(f"{path}#run_2"), SHORT)
+    check(read_trial(f"{a_mat}#run_2"), SHORT)
     with pytest.warns(TrialWarning, match="'cells' is passed over: a cell array"):
-        check(read_trial(f"{path}#run_1"))
+        check(read_trial(f"{a_mat}#run_1"))
 
 
 def test_a_file_that_ends_its_library_ends_nothing_else(tmp_path, hdf5):
@@ -380,29 +388,27 @@ def tdms(path, groups, **properties):
     )
 
 
-def test_channels_of_tdms_are_columns_and_groups_trials(tmp_path, capfd):
+def test_channels_of_tdms_are_columns_and_groups_trials(a_tdms, capfd):
     """Odd segments at the end print nothing."""
-    path = tmp_path / "a.tdms"
-    tdms(path, {"log": COLUMNS})
-    path.write_bytes(path.read_bytes() + (b"TDSm" + struct.pack("<iIQQ", 0, 4711, 0, 0)) * 9)
-    check(read_trial(path))
+    tdms(a_tdms, {"log": COLUMNS})
+    a_tdms.write_bytes(a_tdms.read_bytes() + (b"TDSm" + struct.pack("<iIQQ", 0, 4711, 0, 0)) * 9)
+    check(read_trial(a_tdms))
     assert capfd.readouterr() == ("", "")
-    tdms(path, {"ramp": COLUMNS, "step": SHORT, "scale": {"a": np.arange(3.0)}})
-    check(read_trial(f"{path}#step"), SHORT)
-    assert "a.tdms holds 2 trials" in refused(path)
+    tdms(a_tdms, {"ramp": COLUMNS, "step": SHORT, "scale": {"a": np.arange(3.0)}})
+    check(read_trial(f"{a_tdms}#step"), SHORT)
+    assert "a.tdms holds 2 trials" in refused(a_tdms)
 
 
-def test_waveforms_of_tdms_have_their_time(tmp_path):
-    path = tmp_path / "a.tdms"
+def test_waveforms_of_tdms_have_their_time(a_tdms):
     signals = {name: values for name, values in COLUMNS.items() if name != "time_s"}
-    tdms(path, {"log": signals}, wf_increment=0.02, wf_start_offset=0.0)
-    check(read_trial(path))
+    tdms(a_tdms, {"log": signals}, wf_increment=0.02, wf_start_offset=0.0)
+    check(read_trial(a_tdms))
     stamps = np.datetime64("2026-03-01T10:11:12") + (TIME * 1e6).astype("timedelta64[us]")
-    tdms(path, {"log": {"time_s": stamps, **signals}})
+    tdms(a_tdms, {"log": {"time_s": stamps, **signals}})
     with pytest.warns(TrialWarning, match="converted to seconds from the first row"):
-        check(read_trial(path))
-    tdms(path, {"log": COLUMNS}, unit_string="m")
-    assert "gives 'time_s' the unit 'm'" in refused(path)
+        check(read_trial(a_tdms))
+    tdms(a_tdms, {"log": COLUMNS}, unit_string="m")
+    assert "gives 'time_s' the unit 'm'" in refused(a_tdms)
 
 
 WAVE = {"wf_increment": 0.02, "wf_start_offset": 0.0, "wf_start_time": np.datetime64(0, "us")}
@@ -432,35 +438,33 @@ def waves(path, **changed):
         ({"wf_start_time": None}, slice(None), None),
     ],
 )
-def test_a_channel_with_a_clock_of_its_own_is_shifted_or_refused(tmp_path, changed, rows, readings):
-    path = tmp_path / "a.tdms"
-    waves(path, contraction_mm=changed)
+def test_a_channel_with_a_clock_of_its_own_is_shifted_or_refused(a_tdms, changed, rows, readings):
+    waves(a_tdms, contraction_mm=changed)
     if readings is None:
-        assert "'contraction_mm' has readings " in refused(path)
+        assert "'contraction_mm' has readings " in refused(a_tdms)
     else:
         with pytest.warns(
             TrialWarning, match="'contraction_mm' has readings from .* in the rows of th"
         ):
-            trial = read_trial(path)
+            trial = read_trial(a_tdms)
         expected = np.full(ROWS, np.nan)
         expected[rows] = COLUMNS["contraction_mm"][readings] / 1e3
         assert_allclose(trial.measurements["contraction"], expected)
         assert_allclose(trial.time, TIME, atol=1e-9)
-    waves(path, other=changed)
+    waves(a_tdms, other=changed)
     with pytest.warns(TrialWarning, match="'other'"):
-        check(read_trial(path))
+        check(read_trial(a_tdms))
 
 
-def test_commands_have_the_clock_of_the_rows(tmp_path):
-    path = tmp_path / "a.tdms"
-    waves(path, motor_voltage_v={"wf_start_offset": 0.04})
+def test_commands_have_the_clock_of_the_rows(a_tdms):
+    waves(a_tdms, motor_voltage_v={"wf_start_offset": 0.04})
     with pytest.warns(TrialWarning, match="'contraction_mm' has readings from 0 to 0.58 s"):
-        trial = read_trial(path)
+        trial = read_trial(a_tdms)
     assert_allclose(trial.commands["motor_voltage"], COLUMNS["motor_voltage_v"])
     assert_allclose(trial.measurements["contraction"][:-2], COLUMNS["contraction_mm"][2:] / 1e3)
-    waves(path, load_command_n={}, motor_voltage_v={"wf_start_offset": 0.04})
+    waves(a_tdms, load_command_n={}, motor_voltage_v={"wf_start_offset": 0.04})
     assert "'motor_voltage_v' has readings from 0.04 to 0.62 s in steps of 0.02 s, the" in refused(
-        path
+        a_tdms
     )
 
 
@@ -481,8 +485,7 @@ def parquet():
     return pytest.importorskip("pyarrow.parquet")
 
 
-def test_parquet_of_dates_decimals_and_texts_is_read(tmp_path, parquet):
-    path = tmp_path / "a.parquet"
+def test_parquet_of_dates_decimals_and_texts_is_read(a_parquet, parquet):
     start = datetime.datetime(2026, 3, 1, 10, 11, 12, tzinfo=datetime.UTC)
     columns = {
         "time_s": [start + datetime.timedelta(seconds=t) for t in TIME.tolist()],
@@ -490,9 +493,9 @@ def test_parquet_of_dates_decimals_and_texts_is_read(tmp_path, parquet):
         "contraction_mm": [repr(x) for x in COLUMNS["contraction_mm"].tolist()],
         "nested": [[1]] * ROWS,
     }
-    table(parquet, path, columns)
+    table(parquet, a_parquet, columns)
     with pytest.warns(TrialWarning, match="holds dates, converted to seconds|'nested'"):
-        trial = read_trial(path)
+        trial = read_trial(a_parquet)
     assert_allclose(trial.time, TIME, atol=1e-9)
     assert_allclose(trial.measurements["contraction"], COLUMNS["contraction_mm"] / 1e3)
 
@@ -505,37 +508,34 @@ def table(parquet, path, columns=COLUMNS, metadata=None, **kwargs):
 
 
 @pytest.mark.parametrize("notes", ["[1]", "{", '"a"', "[" * 100_000, "nul", '{"a": {"b": 1}}'])
-def test_provenance_that_is_none_is_passed_over(tmp_path, parquet, notes):
-    path = tmp_path / "a.parquet"
-    table(parquet, path, metadata={"pma_gym.provenance": notes})
+def test_provenance_that_is_none_is_passed_over(a_parquet, parquet, notes):
+    table(parquet, a_parquet, metadata={"pma_gym.provenance": notes})
     with pytest.warns(TrialWarning, match="provenance (is|are) passed over"):
-        trial = read_trial(path)
+        trial = read_trial(a_parquet)
     check(trial)
     assert not trial.provenance
-    table(parquet, path, metadata={"pma_gym.provenance": json.dumps({"seed": 1, "a": None})})
-    assert dict(read_trial(path).provenance) == {"seed": "1", "a": ""}
+    table(parquet, a_parquet, metadata={"pma_gym.provenance": json.dumps({"seed": 1, "a": None})})
+    assert dict(read_trial(a_parquet).provenance) == {"seed": "1", "a": ""}
 
 
-def test_texts_of_megabytes_in_every_row_take_no_memory(tmp_path, parquet):
+def test_texts_of_megabytes_in_every_row_take_no_memory(a_parquet, parquet):
     import pyarrow as pa
 
-    path = tmp_path / "a.parquet"
     note = pa.DictionaryArray.from_arrays(pa.array([0] * ROWS), pa.array(["x" * 2**21]))
-    table(parquet, path, {**COLUMNS, "note": note}, compression="zstd")
+    table(parquet, a_parquet, {**COLUMNS, "note": note}, compression="zstd")
     with pytest.warns(TrialWarning, match="unknown columns are ignored: 'note'"):
-        check(read_trial(path))
-    table(parquet, path, {**COLUMNS, "load_n": note}, compression="zstd")
-    assert "limit of 10000 characters a cell" in refused(path)
+        check(read_trial(a_parquet))
+    table(parquet, a_parquet, {**COLUMNS, "load_n": note}, compression="zstd")
+    assert "limit of 10000 characters a cell" in refused(a_parquet)
 
 
-def test_pages_beyond_the_limit_are_not_unpacked(tmp_path, parquet, monkeypatch):
-    path = tmp_path / "a.parquet"
+def test_pages_beyond_the_limit_are_not_unpacked(a_parquet, parquet, monkeypatch):
     zeros = {name: np.zeros(400_000) for name in COLUMNS}
-    table(parquet, path, zeros, compression="zstd", use_dictionary=False)
+    table(parquet, a_parquet, zeros, compression="zstd", use_dictionary=False)
     monkeypatch.setenv("PMA_GYM_MAX_TABLE_MIB", "5")
-    assert "limit of 5 MiB that the tables of a packed file" in refused(path)
+    assert "limit of 5 MiB that the tables of a packed file" in refused(a_parquet)
     monkeypatch.setenv("PMA_GYM_MAX_ROWS", "1000")
-    assert "limit of 1000 rows a table: it has 400000" in refused(path)
+    assert "limit of 1000 rows a table: it has 400000" in refused(a_parquet)
 
 
 @pytest.mark.parametrize(
@@ -558,12 +558,11 @@ def test_a_large_text_is_refused(tmp_path, monkeypatch, name, content, limit, nu
     assert message in refused(tmp_path / name)
 
 
-def test_texts_that_refer_to_each_other_are_read(tmp_path, parquet):
-    path = tmp_path / "a.parquet"
+def test_texts_that_refer_to_each_other_are_read(a_parquet, parquet):
     loads = {"load_n": [f"1{k:04}" for k in range(ROWS)]}
     encoding = {"load_n": "DELTA_BYTE_ARRAY"}
-    table(parquet, path, {**COLUMNS, **loads}, use_dictionary=False, column_encoding=encoding)
-    assert read_trial(path).measurements["load"][-1] == 10_029.0
+    table(parquet, a_parquet, {**COLUMNS, **loads}, use_dictionary=False, column_encoding=encoding)
+    assert read_trial(a_parquet).measurements["load"][-1] == 10_029.0
 
 
 def test_a_wide_file_is_refused_at_once(tmp_path, monkeypatch):

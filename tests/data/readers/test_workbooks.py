@@ -32,6 +32,12 @@ def book(path, iso_dates=False, **sheets):
     return made
 
 
+@pytest.fixture
+def path(tmp_path):
+    """Where the workbook of a test lies."""
+    return tmp_path / "a.xlsx"
+
+
 def patched(path, part, change):
     """The workbook with one part of it changed."""
     with zipfile.ZipFile(path) as archive:
@@ -52,15 +58,13 @@ def check(trial, rows=ROWS):
 
 
 @pytest.mark.parametrize("size", ["A1:C3", "A1:A1", "A1:XFD1048576", ""])
-def test_the_declared_size_of_a_sheet_is_not_trusted(tmp_path, size):
-    path = tmp_path / "a.xlsx"
+def test_the_declared_size_of_a_sheet_is_not_trusted(path, size):
     book(path)
     patched(path, SHEET, lambda xml: re.sub(b'ref="A1:C21"', f'ref="{size}"'.encode(), xml))
     check(read_trial(path))
 
 
-def test_titles_units_and_footers_are_named(tmp_path):
-    path = tmp_path / "a.xlsx"
+def test_titles_units_and_footers_are_named(path):
     rows = [("Test of March",), (), HEADER, ("s", "V", "mm"), *SAMPLES, (), ("Mean", 1.9, 35.25)]
     book(path, run=rows)
     with pytest.warns(TrialWarning) as said:
@@ -72,8 +76,7 @@ def test_titles_units_and_footers_are_named(tmp_path):
     assert place_in_file(path, 0) == "row 5 of a.xlsx"
 
 
-def test_each_sheet_is_a_trial_of_a_data_set(tmp_path):
-    path = tmp_path / "a.xlsx"
+def test_each_sheet_is_a_trial_of_a_data_set(tmp_path, path):
     notes = [("who", "N. N."), ("rig", 2)]
     book(path, run1=[HEADER, *SAMPLES], notes=notes, empty=[], run2=[HEADER, *SAMPLES[:9]])
     with pytest.raises(TrialError, match=r"a.xlsx holds 2 trials: 'a.xlsx#run1', 'a.xlsx#run2'"):
@@ -94,8 +97,7 @@ def test_each_sheet_is_a_trial_of_a_data_set(tmp_path):
         read_dataset(tmp_path)
 
 
-def test_hidden_sheets_are_named_and_read_where_no_other_is(tmp_path):
-    path = tmp_path / "a.xlsx"
+def test_hidden_sheets_are_named_and_read_where_no_other_is(path):
     made = book(path, run=[HEADER, *SAMPLES], old=[HEADER, *SAMPLES[:3]])
     made["old"].sheet_state = "hidden"
     made.save(path)
@@ -108,8 +110,7 @@ def test_hidden_sheets_are_named_and_read_where_no_other_is(tmp_path):
         read_trial(path)
 
 
-def test_formulas_without_stored_values_are_named_and_with_them_are_read(tmp_path):
-    path = tmp_path / "a.xlsx"
+def test_formulas_without_stored_values_are_named_and_with_them_are_read(path):
     rows = [HEADER, *[(t, u, f"=A{n}*2") for n, (t, u, _) in enumerate(SAMPLES, start=2)]]
     book(path, run=rows)
     with pytest.raises(TrialError, match="cell C2 and 19 more of a.xlsx, sheet 'run', hold form"):
@@ -151,9 +152,8 @@ def test_dates_in_the_time_column_become_seconds(iso_dates, tmp_path):
         assert_allclose(trial.time, [t for t, _, _ in SAMPLES], atol=1e-5)
 
 
-def test_texts_of_all_kinds_are_read(tmp_path):
+def test_texts_of_all_kinds_are_read(path):
     """Shared texts, rich texts, cells without places: as other programs write them."""
-    path = tmp_path / "a.xlsx"
     book(path, run=[HEADER, (0, 1, "2,5"), (1, 1, "3,5")])
     xml = (
         b'<?xml version="1.0"?><x:worksheet xmlns:x="http://schemas.openxmlformats.org/'
@@ -180,8 +180,7 @@ def test_texts_of_all_kinds_are_read(tmp_path):
 @pytest.mark.parametrize(
     "text", ['=HYPERLINK("http://x","y")', "+1", "-1", "@sum", "#N/A", "\x01a"]
 )
-def test_names_in_written_workbooks_are_text(tmp_path, text):
-    path = tmp_path / "a.xlsx"
+def test_names_in_written_workbooks_are_text(path, text):
     write_trial(Trial([0.0], {"load_command": [0.0]}, provenance={"model": text, text: "x"}), path)
     kinds = {cell.data_type for row in openpyxl.load_workbook(path)["provenance"] for cell in row}
     assert kinds == {"s"}
@@ -225,9 +224,8 @@ def test_a_workbook_that_hurts_is_refused_before_the_memory_is_taken(tmp_path, m
     assert message in str(caught.value)
 
 
-def test_a_bare_array_of_many_rows_is_read(tmp_path):
+def test_a_bare_array_of_many_rows_is_read(path):
     """A sheet as a program writes it that streams: no places, no declared size."""
-    path = tmp_path / "a.xlsx"
     made = openpyxl.Workbook(write_only=True)
     sheet = made.create_sheet("run")
     sheet.append(HEADER)

@@ -1,14 +1,19 @@
-"""The PID against analytic responses, at its limits, and on the station."""
+"""The PID against analytic responses, at its limits, and on the station.
+
+Preview MPC: its quadratic program, its limits, its bits, and what it reaches on the station.
+"""
 
 import math
+import sys
 import warnings
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from controllers import CONTROLLERS, PID, FeedforwardPID
+from controllers import CONTROLLERS, PID, FeedforwardPID, PreviewMPC
 from controllers.design.designs import Gains, scheduled_gains
+from controllers.design.quadratic_program import ACCURACY, BoundedProgram, imported_osqp
 from controllers.models.voltage import nominal_offset
 from pma_gym.envs import PMAEnv
 from pma_gym.plant.model import load_model
@@ -80,20 +85,16 @@ def test_pi_that_cancels_the_pole_leaves_a_first_order_loop(station, reading):
     assert got == pytest.approx(wanted * (1.0 - np.exp(-times / closed)), abs=0.005 * wanted)
 
 
-def test_ramp_error_is_the_voltage_s_slope_over_the_integral_gain(station, reading):
+@pytest.mark.parametrize("lead", [0.0, 1.0 / (4e-3 * 6000.0)])
+def test_ramp_error_is_the_voltages_slope_over_the_integral_gain_less_the_lead(
+    lead, station, reading
+):
     pole, gain, speed = 0.9, 4e-3, 5e-3
-    gains = Gains(300.0, 6000.0, 0.0, 0.005)
+    gains = Gains(300.0, 6000.0, 0.0, 0.005, lead=lead)
     controller = begun(gains, station, lambda time: speed * time)
     got = close(controller, pole, gain, 500, reading, offset=nominal_offset(station()))
-    assert speed * 5.0 - got[-1] == pytest.approx(speed / gain / 6000.0, rel=1e-6)
-
-
-def test_lead_takes_that_error_away(station, reading):
-    pole, gain, speed = 0.9, 4e-3, 5e-3
-    gains = Gains(300.0, 6000.0, 0.0, 0.005, lead=1.0 / (gain * 6000.0))
-    controller = begun(gains, station, lambda time: speed * time)
-    got = close(controller, pole, gain, 500, reading, offset=nominal_offset(station()))
-    assert got[-1] == pytest.approx(speed * 5.0, rel=1e-6)
+    left = speed * (1.0 / (gain * 6000.0) - lead)
+    assert speed * 5.0 - got[-1] == pytest.approx(left, rel=1e-6, abs=1e-6 * speed)
 
 
 def test_derivative_is_filtered(station, reading):
@@ -201,21 +202,6 @@ def test_regulator_begins_at_the_voltage_that_holds_its_pressure(station, readin
     assert controller.act(reading(extension=-1e-3), PERIOD) < controller.act(reading(), 0.0)
 
 
-@pytest.mark.parametrize(
-    ("kind", "error", "late_error"),
-    # PID alone has 0.113 mm in phase III of the late loop.
-    [(PID, 0.05, 0.115), (FeedforwardPID, 0.05, 0.10)],
-)
-def test_contraction_and_late_commands(kind, error, late_error, drive):
-    got, _ = drive(kind(), "isotonic", 200)
-    assert max(got.values()) <= error
-    loop = {"control_rate_hz": 50.0, "action_delay_s": 0.02}
-    got, _ = drive(kind(), "isotonic", 200, **loop)
-    assert max(got.values()) <= late_error
-    got, _ = drive(kind(), "displacement", 200, **loop)
-    assert got["displacement"] <= 0.10
-
-
 def test_missing_gains_say_how_to_tune_them(station, tmp_path):
     path = tmp_path / "gains.toml"
     path.write_text("schema = 3\n")
@@ -227,16 +213,80 @@ def test_missing_gains_say_how_to_tune_them(station, tmp_path):
         scheduled_gains("pid", station("rotation"), path)
 
 
-@pytest.mark.parametrize(
-    ("kind", "pressure"), [(PID, 150), (PID, 225), (PID, 550), (FeedforwardPID, 225)]
-)
-def test_displacement_target(kind, pressure, drive):
-    got, _ = drive(kind(), "displacement", pressure)
-    assert got["displacement"] <= 0.10
+def problem(seed, count=6):
+    generator = np.random.default_rng(seed)
+    rows = generator.normal(size=(2 * count, count))
+    return rows.T @ rows, generator.normal(size=count)
 
 
-@pytest.mark.parametrize(("kind", "pressure"), [(PID, 275), (FeedforwardPID, 500)])
-def test_rotation_targets(kind, pressure, drive):
-    got, _ = drive(kind(), "rotation", pressure)
-    assert max(got["I"], got["II"]) <= 0.4
-    assert got["III"] <= 0.3
+@pytest.mark.parametrize("seed", range(5))
+def test_without_limits_the_program_solves_the_normal_equations(seed):
+    square, linear = problem(seed)
+    program = BoundedProgram(6)
+    solution = program.solve(square, linear, np.full(6, -1e6), np.full(6, 1e6))
+    assert np.allclose(square @ solution, -linear, rtol=0, atol=1e-10)
+    assert program.limited == 0
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_at_limits_the_program_keeps_the_optimality_conditions(seed):
+    square, linear = problem(seed)
+    program = BoundedProgram(6)
+    low, high = np.full(6, -0.05), np.full(6, 0.02)
+    solution = program.solve(square, linear, low, high)
+    slope = square @ solution + linear
+    assert program.limited == 1 and program.failures == 0
+    assert np.all((low <= solution) & (solution <= high))
+    near = 100.0 * ACCURACY
+    # At a limit the slope pushes against it, elsewhere there is none (Karush, Kuhn, Tucker).
+    assert np.all(slope[solution <= low + near] >= -near * np.abs(square).max())
+    assert np.all(slope[solution >= high - near] <= near * np.abs(square).max())
+    inside = (solution > low + near) & (solution < high - near)
+    assert np.abs(slope[inside]).max(initial=0.0) < near * np.abs(square).max()
+
+
+def test_the_plan_is_the_least_squares_solution_of_the_stepped_model(station):
+    """Error and changes of voltage stacked, the error found by stepping the filters' own model."""
+    controller = PreviewMPC()
+    controller.reset(lambda time: 5e-3 * time, station())
+    design, bank = controller._design, controller._bank
+    first, count = 200, controller._count
+    generator = np.random.default_rng(0)
+    start = 1e-3 * generator.normal(size=bank.estimates.shape) * (design.sensors[0] != 0.0)
+    weights, nominal = bank.weights, design.motion.volts
+
+    def errors(plan):
+        x, residuals = start, []
+        for k, volts in enumerate(plan):
+            x = bank.moved(x, first + k, nominal[first + k] + volts)
+            predicted = x @ design.ahead[0, first, 0]
+            residuals.append(design.motion.error[first + k + 1] + weights @ predicted)
+        return np.array(residuals)
+
+    free = errors(np.zeros(count))
+    effect = np.stack([errors(1e-3 * pulse) - free for pulse in np.eye(count)], axis=1) / 1e-3
+    scale = np.sqrt(np.mean(np.sum(effect**2, axis=0)))
+    effort = np.sqrt(controller.settings.effort)
+    changes = np.eye(count) - np.eye(count, k=-1)
+    rows = np.vstack([effect / scale, effort * changes])
+    wanted, *_ = np.linalg.lstsq(rows, np.append(-free / scale, np.zeros(count)))
+    square, linear = controller._problem(first, start, weights)
+    plan = controller.program.solve(square, linear, np.full(count, -1e6), np.full(count, 1e6))
+    assert np.abs(wanted).max() > 1e-3
+    assert plan == pytest.approx(wanted, abs=1e-6 * np.abs(wanted).max())
+
+
+def test_voltages_keep_their_limits_whatever_the_sensors_say(station, reading):
+    generator = np.random.default_rng(1)
+    controller = PreviewMPC()
+    controller.reset(lambda time: 5e-3 * time, station())
+    for k in range(120):
+        noisy = reading(extension=float(generator.normal(0.0, 0.03)), time=0.01 * k)
+        assert 0.0 <= controller.act(noisy, 0.01 * k) <= 10.0
+    assert controller.program.limited > 0 and controller.program.failures == 0
+
+
+def test_a_missing_osqp_says_how_to_install_it(monkeypatch):
+    monkeypatch.setitem(sys.modules, "osqp", None)
+    with pytest.raises(ImportError, match=r"needs osqp.*pip install pma-gym\[mpc\]"):
+        imported_osqp()

@@ -1,4 +1,7 @@
-"""The interval of a fitted delay holds the true one, which a sensor had exactly."""
+"""Initial states that the readings of a trial say.
+
+The interval of a fitted delay holds the true one, which a sensor had exactly.
+"""
 
 import numpy as np
 import pytest
@@ -7,9 +10,38 @@ from scipy.interpolate import CubicSpline
 from pma_gym import Plant
 from pma_gym.data.trial import Trial
 from pma_gym.estimation.fitting import fit
+from pma_gym.estimation.initial_states import meet
+from pma_gym.estimation.logged import Logged
 from pma_gym.plant import sensors
 from pma_gym.plant.model import load_model
 from tests.discovery.rig_trials import FROZEN
+
+
+def _logged(rows, seed):
+    """A slide's trial, one reading of which is missing."""
+    at, generator = np.arange(rows) / 100.0, np.random.default_rng(seed)
+    readings = 1e-3 * generator.normal(size=rows)
+    readings[rows // 2] = np.nan
+    trial = Trial(at, {"load_command": np.zeros(rows)}, {"contraction": readings})
+    return Logged.of(load_model(FROZEN / "driven_slide" / "model.toml"), 0, trial)
+
+
+def test_trials_are_corrected_together_as_each_alone():
+    """One of them runs away; the others do not mind."""
+    generator = np.random.default_rng(7)
+    logs = [_logged(rows, rows) for rows in (40, 55, 40)]
+    spaces = [generator.normal(size=(6, len(logged.time), 3)) for logged in logs]
+    spaces[1][-1] = 1e200
+    held = [[space[:, :, k].copy() for k in range(len(logs[0].signals))] for space in spaces]
+    levels = np.full(len(logs[0].signals), 1e-5)
+    alone = [space.copy() for space in spaces]
+    together = meet(spaces, held, logs, levels, 2)
+    for space, here, logged, one, other in zip(alone, held, logs, together, spaces, strict=True):
+        (correction,) = meet([space], [here], [logged], levels, 2)
+        np.testing.assert_array_equal(correction.moves, one.moves)
+        assert (correction.misfit, correction.rough) == (one.misfit, one.rough)
+        np.testing.assert_array_equal(space, other)
+
 
 ROW_S, FINE_S, BEFORE_S = 0.01, 5e-4, 0.2
 TACHOMETER = {"tachometer": {"bandwidth_hz": 1000.0, "noise_mm_per_s": 1.0}}
