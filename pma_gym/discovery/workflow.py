@@ -18,6 +18,7 @@ from pma_gym.discovery.fitting.fit_problem import FitProblem, Fitted
 from pma_gym.discovery.fitting.free_parameters import free_parameters
 from pma_gym.discovery.fitting.held_out import held_out_misfit
 from pma_gym.discovery.fitting.journal import Journal
+from pma_gym.discovery.grey_box.answer import answered
 from pma_gym.discovery.preparation.acceptance_floors import Stated, acceptance_floors
 from pma_gym.discovery.preparation.data_checks import check_dataset
 from pma_gym.discovery.preparation.initial_floors import Level, initial_floors
@@ -44,6 +45,7 @@ from pma_gym.discovery.verdict.common_drift import with_common_drift
 from pma_gym.discovery.verdict.decision import suspicious
 from pma_gym.discovery.verdict.findings import Findings
 from pma_gym.discovery.verdict.tolerated import is_tolerated, may_be_tolerated, without_effects
+from pma_gym.estimation.innovations import PORTS
 from pma_gym.estimation.logged import Logged
 from pma_gym.plant.model import Model, ModelError, load_model
 
@@ -137,6 +139,15 @@ class _Work:
         dataset, given = self._input()
         named, words = prepared(dataset.trials, given)
         trials = [each.trial for each in named]
+        if given.plant in PORTS:
+            every = _candidates(given, named) if search else None
+            own = free_parameters(given)
+            _check_size([Logged.of(given, i, trial) for i, trial in enumerate(trials)], own.free)
+            said = self._timed(
+                "grey box",
+                lambda: answered(given, named, every, dataset.tolerance, self.seed, self._tell),
+            )
+            return replace(said, warnings=(*words, *said.warnings), seconds=dict(self.seconds))
         given, slower = with_recorded_bandwidth(given, trials)
         words = (*(dataset.checked or ()), *words, *slower)
         journal = Journal(self.folder, trials, given, f"diagnosis 7 seed {self.seed}")

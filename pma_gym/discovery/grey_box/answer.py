@@ -1,0 +1,642 @@
+"""What a search found as a diagnosis: verdict, sizes with intervals, gaps of predictions, the amended model."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pma_gym.data.datasets.dataset import NamedTrial
+from pma_gym.data.trial_columns import BY_QUANTITY
+from pma_gym.discovery.answer.trial_records import gaps
+from pma_gym.discovery.diagnosis import Diagnosis, Verdict
+from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
+from pma_gym.discovery.fitting.free_parameters import at_limit
+from pma_gym.discovery.report.effect_text import effect_name, effect_names
+from pma_gym.discovery.report.figure_text import (
+    estimate_text,
+    figure,
+    listed,
+    percent,
+    signal_name,
+    signal_unit,
+)
+from pma_gym.discovery.report.size_text import sized_effects
+from pma_gym.discovery.result.candidate import ADDED, Candidate
+from pma_gym.discovery.result.estimates import Approximate, Estimate, Moved, NamedEffect, TrialState
+from pma_gym.discovery.result.misfit import Gap, Place, ResidualLaw, TrialRecord
+from pma_gym.discovery.result.noise import Floor
+from pma_gym.effects import CATALOGUE
+from pma_gym.estimation.logged import Logged
+from pma_gym.estimation.innovations import TREND, TRIAL, GreyBox, Point, counted, predictions
+from pma_gym.estimation.likelihood_fit import Fit, fit, value_of, with_tied, with_values
+from pma_gym.discovery.grey_box.search import Hypothesis, Move, Search
+from pma_gym.estimation.smoother import Smoothed, smoothed
+from pma_gym.discovery.grey_box.thresholds import (
+    CONFIDENCE,
+    HORIZON,
+    HORIZON_S,
+    LEFT,
+    LIKE,
+    MATERIAL,
+    NOISES,
+    ROWS_LATE,
+)
+from pma_gym.plant.model import Model
+from pma_gym.units import SI_FACTORS, Quantity
+
+Array = NDArray[np.float64]
+
+FOLDS = 3
+"""Parts of the trials that are left out in turn."""
+
+BINS = 12
+"""Of a law that is drawn from the smoothed force."""
+
+
+@dataclass(frozen=True)
+class Found:
+    """All that a search found, and what follows from it.
+
+    Attributes:
+        search: the search.
+        path: its hypotheses, the model as it came first.
+        named: the trials.
+        tolerance: what the lab tolerates, by column in its unit.
+        candidates: the whole catalogue.
+    """
+
+    search: Search
+    path: Sequence[Hypothesis]
+    named: Sequence[NamedTrial]
+    tolerance: Mapping[str, float]
+    candidates: Sequence[CandidateEffect]
+
+    @cached_property
+    def horizon(self) -> float:
+        """How far ahead is predicted (s)."""
+        shortest = min(float(each.time[-1] - each.time[0]) for each in self.search.logged)
+        return min(HORIZON_S, HORIZON * shortest)
+
+    @cached_property
+    def last(self) -> Hypothesis:
+        """The hypothesis that is proposed: the last that predicts trials left out no worse than the one before."""
+        best = self.path[0]
+        for each in self.path[1:]:
+            if self.misfit(each) <= self.misfit(best) * (1.0 + 1e-3):
+                best = each
+        return best
+
+    def curves(self, each: Hypothesis) -> list[Array]:
+        """Predictions of all trials, those left out by fits that had not seen them."""
+        if id(each) not in self._curves:
+            self._curves[id(each)] = (
+                self._left_out(each) if self.holds_out(each) else self._seen(each)
+            )
+        return self._curves[id(each)]
+
+    @cached_property
+    def _curves(self) -> dict[int, list[Array]]:
+        return {}
+
+    def holds_out(self, each: Hypothesis) -> bool:
+        """Whether trials can be left out: a parameter of one trial alone cannot be told by the others."""
+        return len(self.named) > 1 and not any(TRIAL in move.name for move in each.moves)
+
+    def _seen(self, each: Hypothesis) -> list[Array]:
+        return predictions(each.box, each.fit.point, self.horizon)
+
+    def _left_out(self, each: Hypothesis) -> list[Array]:
+        count = len(self.named)
+        out: list[Array] = [np.empty(0)] * count
+        for fold in range(min(FOLDS, count)):
+            left = [i for i in range(count) if i % FOLDS == fold]
+            rows = [
+                counted(trial, np.full(len(trial.time), i not in left))
+                for i, trial in enumerate(each.box.rows)
+            ]
+            for i in left:
+                rows[i].there = np.zeros_like(rows[i].there)
+            box = GreyBox(each.box.model, rows, each.box.channels)
+            made = fit(box, each.fit.point, each.fit.coordinates, each.fit.tied)
+            forces = {f"force {i}": value_of(each.fit.point, f"force {i}") for i in left}
+            curves = predictions(each.box, with_values(made.point, forces), self.horizon)
+            for i in left:
+                out[i] = curves[i]
+        return out
+
+    def misfit(self, each: Hypothesis) -> float:
+        """Root mean square of what predictions miss, in noises."""
+        parts = [
+            ((curve - trial.readings[:, :, 0]) / self.path[0].fit.point.deviations)[trial.there]
+            for curve, trial in zip(self.curves(each), each.box.rows, strict=True)
+        ]
+        return float(np.sqrt(np.mean(np.concatenate(parts) ** 2)))
+
+    @cached_property
+    def given(self) -> list[Array]:
+        """Predictions of the model as it came, with the noise and latent force of its fit."""
+        base = self.path[0]
+        own = base.box.numbers()
+        values = {c.name: own[c.name] for c in base.fit.coordinates if c.name in own}
+        late = {"delay": 0.0}
+        point = with_values(base.fit.point, with_tied({**values, **late}, base.fit.tied))
+        return predictions(base.box, point, self.horizon)
+
+    def share(self, each: Hypothesis) -> float:
+        """Latent force, in the mean over the horizon, root mean square over trials, as a share of the drive's.
+
+        The mean of an Ornstein-Uhlenbeck force of memory m over a time h has the variance 2 m / h (1 - m / h (1 - e^(-h / m))) of
+        its own: what changes fast moves nothing far.
+        """
+        ratio = each.fit.point.memory / self.horizon
+        mean = 2.0 * ratio * (1.0 - ratio * (1.0 - np.exp(-1.0 / ratio)))
+        return float(np.sqrt(np.mean(np.square(each.fit.point.forces)) * mean)) / self.search.force
+
+    @cached_property
+    def left(self) -> float:
+        """Share of the predictions' misfit beyond noise (mean square) that the proposed hypothesis leaves."""
+        before, after = (
+            max(self.misfit(each) ** 2 - 1.0, 1e-9) for each in (self.path[0], self.last)
+        )
+        return min(1.0, after / before)
+
+    @cached_property
+    def is_latent(self) -> bool:
+        """Whether a latent force is worth its price beside the proposed hypothesis."""
+        last = self.last
+        without = [c for c in last.fit.coordinates if not c.name.startswith("force ")]
+        none = replace(last.fit.point, forces=(1e-6 * self.search.force,) * len(self.named))
+        made = fit(last.box, none, without, last.fit.tied)
+        return last.fit.value - made.value > self.search.price(last, replace(last, fit=made)) + LIKE
+
+    @cached_property
+    def delayed(self) -> bool:
+        """Whether a delay of the command is worth its price, and more than a clock's jitter."""
+        last = self.last
+        if not any(c.name == "delay" for c in last.fit.coordinates):
+            return False
+        late, error = last.fit.point.delay, last.fit.deviations["delay"]
+        if late < max(
+            ROWS_LATE * self.search.span / self.search.stride / self.search.block,
+            CONFIDENCE * error,
+        ):
+            return False
+        prompt = [c for c in last.fit.coordinates if c.name != "delay"]
+        made = fit(last.box, replace(last.fit.point, delay=0.0), prompt, last.fit.tied)
+        price = self.search.price(last, replace(last, fit=made)) + np.log(len(self.candidates))
+        return last.fit.value - made.value > price + LIKE
+
+    @cached_property
+    def verdict(self) -> Verdict:
+        """See `pma_gym.discovery.diagnosis.Verdict`."""
+        effects = self.delayed or any(move.candidate for move in self.last.moves)
+        material = self.share(self.last) > MATERIAL and self.is_latent
+        if material and (self.left > LEFT or not self.last.moves):
+            return "unknown"
+        if effects:
+            return "effect"
+        if not self.last.moves and self.misfit(self.last) > NOISES and self.is_latent:
+            return "undecidable"
+        if self._within_tolerance() or not self.last.moves and not self._moved:
+            return "agrees"
+        return "parameters"
+
+    def _within_tolerance(self) -> bool:
+        """Whether the model as it came is within what the lab tolerates, in all signals that it says one for."""
+        known = {name: gap for name, gap in self.gap.items() if name in self.tolerance}
+        return (
+            bool(known)
+            and not self.last.moves
+            and all(g.before <= self.tolerance[n] for n, g in known.items())
+        )
+
+    @cached_property
+    def _moved(self) -> bool:
+        """Whether refitting the model's own parameters is worth its price."""
+        base = self.path[0]
+        own = base.box.numbers()
+        free = [c for c in base.fit.coordinates if c.name not in own]
+        values = with_tied(
+            {c.name: own[c.name] for c in base.fit.coordinates if c.name in own}, base.fit.tied
+        )
+        made = fit(base.box, with_values(base.fit.point, values), free, base.fit.tied)
+        return base.fit.value - made.value > self.search.price(base, replace(base, fit=made)) + LIKE
+
+    @cached_property
+    def records(self) -> tuple[TrialRecord, ...]:
+        """Curves and gaps of every trial."""
+        last, base = self.last, self.path[0]
+        records = []
+        signals = self.search.model.rig.signals
+        curves = zip(
+            self.named, last.box.rows, self.given, self.curves(base), self.curves(last), strict=True
+        )
+        for each, trial, *models in curves:
+            shape = (len(trial.time), len(signals))
+            measured, *drawn = (np.full(shape, np.nan) for _ in range(4))
+            own = {}
+            for i, channel in enumerate(last.box.channels):
+                there = trial.there[:, i]
+                measured[there, channel] = trial.readings[there, i, 0]
+                for room, curve in zip(drawn, models, strict=True):
+                    room[:, channel] = curve[:, i]
+                column = BY_QUANTITY[signals[channel].name]
+                off = [
+                    _rms(curve[there, i] - trial.readings[there, i, 0]) / SI_FACTORS[column.unit]
+                    for curve in models
+                ]
+                floor = base.fit.point.deviations[i] / SI_FACTORS[column.unit]
+                own[column.name] = Gap(*off, floor, self.holds_out(last))
+            columns = tuple(signal.column for signal in signals)
+            held = self.holds_out(last)
+            records.append(
+                TrialRecord(
+                    each.name,
+                    trial.time,
+                    measured,
+                    *drawn,
+                    own,
+                    held,
+                    each.file or each.name,
+                    columns,
+                )
+            )
+        return tuple(records)
+
+    @cached_property
+    def gap(self) -> dict[str, Gap]:
+        """Gaps over all trials, by column."""
+        return gaps(self.records)
+
+    @cached_property
+    def model(self) -> Model:
+        """The amended model."""
+        if self.verdict == "agrees":
+            return self.search.model
+        last = (
+            self.last
+            if self.verdict == "effect"
+            else self.path[0]
+            if not self.last.moves
+            else self.last
+        )
+        model = last.box.model
+        if self.delayed and self.verdict == "effect":
+            (late,) = [each for each in self.candidates if each.name == "drive_delay"]
+            model = late.beside(model)
+            milliseconds = (
+                CATALOGUE["drive_delay"].quantities["delay"].from_si(last.fit.point.delay)
+            )
+            model = model.replace({"drive_delay.share": 1.0, "drive_delay.delay_ms": milliseconds})
+        changes = {}
+        for name, value in last.fit.point.numbers.items():
+            effect, _, stem = name.partition(".")
+            if stem in model.effects[effect].rows or TREND in stem or TRIAL in stem or "[" in stem:
+                continue
+            if value != getattr(model.parameters[effect], stem):
+                changes[path_of(name)] = CATALOGUE[effect].quantities[stem].from_si(value)
+        return model.replace(changes)
+
+    def estimate(self, name: str) -> Estimate:
+        """A fitted number with its interval, in its file unit."""
+        made, base = self.last.fit, name.partition(TREND)[0].partition(TRIAL)[0]
+        quantity = _quantity(base)
+        value, error = value_of(made.point, name), CONFIDENCE * made.deviations[name]
+        zero = quantity.to_si(0.0) if TREND in name else 0.0
+        low, value_, high = (
+            quantity.from_si(v + zero) for v in (value - error, value, value + error)
+        )
+        if TREND not in name:
+            low, high = max(low, quantity.lower), min(high, quantity.upper)
+        limit = at_limit(value_, quantity.lower, quantity.upper) if TREND not in name else ""
+        return Estimate(value_, low, high, quantity.unit, limit)
+
+    @cached_property
+    def effects(self) -> tuple[NamedEffect, ...]:
+        """What is missing, with sizes; also the candidate that does most where nothing carries enough."""
+        made = []
+        rivals = [*self.last.rivals, *[()] * len(self.last.moves)]
+        for move, others in zip(self.last.moves, rivals, strict=False):
+            if move.candidate is not None:
+                own = {c.name for c in self.path[0].fit.coordinates}
+                names = [
+                    c.name
+                    for c in self.last.fit.coordinates
+                    if c.name.startswith(f"{move.candidate.effect}.")
+                ]
+                sizes = {
+                    path_of(n).partition(".")[2]: self.estimate(n)
+                    for n in names
+                    if n not in own and TRIAL not in n and TREND not in n
+                }
+                alike = tuple(
+                    other for other in others if TREND not in other and TRIAL not in other
+                )
+                made.append(NamedEffect(move.candidate.name, alike, self._chance(move), sizes))
+        if self.delayed:
+            late, error = (
+                1e3 * v
+                for v in (self.last.fit.point.delay, CONFIDENCE * self.last.fit.deviations["delay"])
+            )
+            made.append(
+                NamedEffect(
+                    "drive_delay",
+                    (),
+                    1e-6,
+                    {"delay_ms": Estimate(late, max(late - error, 0.0), late + error, "ms")},
+                )
+            )
+        return tuple(made)
+
+    def _chance(self, move: Move) -> float:
+        """Bound of the chance of such a gain over all that was looked for."""
+        gain = self.search.gains.get(move.name, 0.0)
+        return float(min(1.0, len(self.candidates) * np.exp(-min(gain, 600.0))))
+
+    @cached_property
+    def parameters(self) -> dict[str, Moved]:
+        """The model's own parameters by path."""
+        own, out = self.path[0].box.numbers(), {}
+        for coordinate in self.last.fit.coordinates:
+            if coordinate.name in own and not coordinate.name.endswith(".presliding"):
+                now = self.estimate(coordinate.name)
+                start = _quantity(coordinate.name).from_si(own[coordinate.name])
+                off = now.low is None or now.high is None or not now.low <= start <= now.high
+                out[path_of(coordinate.name)] = Moved(start, now, off and self.verdict != "agrees")
+        return out
+
+    @cached_property
+    def smooth(self) -> list[Smoothed]:
+        """Latent force of each trial before anything was added."""
+        base = self.path[0]
+        return [smoothed(base.box, base.fit.point, i) for i in range(len(self.named))]
+
+    @cached_property
+    def law(self) -> ResidualLaw | None:
+        """What the latent force goes with most: speed, position or command, in bins."""
+        rig = self.search.model.rig
+        position, speed = (BY_QUANTITY[s.name] for s in rig.signals[:2])
+        force = np.concatenate([each.force for each in self.smooth])
+        variables = {
+            f"{signal_name(position.name)} ({position.unit})": (
+                np.concatenate([s.position for s in self.smooth]),
+                position.unit,
+            ),
+            f"{signal_name(speed.name)} ({speed.unit})": (
+                np.concatenate([s.speed for s in self.smooth]),
+                speed.unit,
+            ),
+        }
+        best = None
+        for name, (x, unit) in variables.items():
+            edges = np.unique(np.quantile(x, np.linspace(0.0, 1.0, BINS + 1)))
+            if len(edges) < 4:
+                continue
+            of = np.clip(np.searchsorted(edges, x, side="right") - 1, 0, len(edges) - 2)
+            count = np.maximum(np.bincount(of, minlength=len(edges) - 1), 1)
+            mean = np.bincount(of, force, len(edges) - 1) / count
+            explained = 1.0 - float(np.mean((force - mean[of]) ** 2)) / max(
+                float(np.mean(force**2)), 1e-300
+            )
+            spread = np.sqrt(
+                np.bincount(of, (force - mean[of]) ** 2, len(edges) - 1)
+                / count
+                / np.maximum(count / INDEPENDENT, 1.0)
+            )
+            if best is None or explained > best[0]:
+                best = (
+                    explained,
+                    name,
+                    0.5 * (edges[:-1] + edges[1:]) / SI_FACTORS[unit],
+                    mean,
+                    CONFIDENCE * spread,
+                )
+        if best is None:
+            return None
+        explained, name, at, mean, wide = best
+        what = "torque on the joint (N m)" if rig.name == "joint" else "force on the slide (N)"
+        words = f"goes with {name.partition(' (')[0]}: that explains {percent(max(explained, 0.0))} of its mean square"
+        return ResidualLaw(what, name, at, mean, mean - wide, mean + wide, words)
+
+    @cached_property
+    def where(self) -> tuple[Place, ...]:
+        """Shares of the latent force by trial."""
+        squares = np.array(
+            [float(np.mean(each.force**2)) * len(each.force) for each in self.smooth]
+        )
+        column = BY_QUANTITY[self.search.model.rig.signals[self.last.box.channels[0]].name].name
+        shares = squares / max(squares.sum(), 1e-300)
+        order = np.argsort(-shares)
+        return tuple(
+            Place(column, f"trial {self.named[i].name}", float(shares[i]), 0.0) for i in order[:3]
+        )
+
+    @cached_property
+    def states(self) -> dict[str, TrialState]:
+        """What belongs to each trial: its start, and its own values."""
+        out = {}
+        position, speed = self.search.model.rig.start_paths.items()
+        for i, (each, smooth) in enumerate(zip(self.named, self._ended, strict=True)):
+            values = {}
+            for (_, path), value in zip(
+                (position, speed), (smooth.position[0], smooth.speed[0]), strict=True
+            ):
+                values[path] = float(value) / SI_FACTORS[_unit(path)]
+            for move in self.last.moves:
+                for name in move.slots:
+                    base, _, number = (
+                        name.partition(TRIAL) if TRIAL in name else name.partition(TREND)
+                    )
+                    if TREND in name or int(number) == i:
+                        own = value_of(self.last.fit.point, name)
+                        own = (
+                            value_of(self.last.fit.point, base) + own * self.last.box.order[i]
+                            if TREND in name
+                            else own
+                        )
+                        values[path_of(base)] = _quantity(base).from_si(own)
+            out[each.name] = TrialState({}, values)
+        return out
+
+    @cached_property
+    def _ended(self) -> list[Smoothed]:
+        return [smoothed(self.last.box, self.last.fit.point, i) for i in range(len(self.named))]
+
+    def by_trial(self) -> list[str]:
+        """Parameters that differ by trial, a clause each."""
+        said = []
+        for move in self.last.moves:
+            for name in move.slots:
+                base = name.partition(TREND)[0].partition(TRIAL)[0]
+                now, path = self.estimate(name), path_of(base)
+                usual = _quantity(base).from_si(value_of(self.last.fit.point, base))
+                if TREND in name:
+                    way = "falls" if now.value * usual < 0.0 else "rises"
+                    share = percent(abs(now.value / usual)) if usual else figure(abs(now.value))
+                    said.append(
+                        f"{path} {way} by {share} from trial to trial ({estimate_text(now)})"
+                    )
+                else:
+                    trial = self.named[int(name.partition(TRIAL)[2])].name
+                    said.append(
+                        f"{trial} alone needs {path} {estimate_text(now)} instead of {figure(usual)}"
+                    )
+        return said
+
+    @cached_property
+    def sentence(self) -> str:
+        """The verdict as a person would say it."""
+        (signal, gap), *_ = self.gap.items()
+        unit = signal_unit(signal)
+        ahead = f"{figure(self.horizon, 2)} s ahead"
+        seen = " of trials that it was not fitted to" if gap.held_out else ""
+        closed = (
+            f"predictions of {signal_name(signal)} {ahead}{seen} miss by {figure(gap.after)} {unit} instead of "
+            f"{figure(gap.before)} (parameters refitted {figure(gap.parameters)}, noise {figure(gap.floor)})"
+        )
+        what = "torque" if self.search.model.plant == "joint" else "force"
+        left = f"a latent {what} of {figure(self.share(self.last) * self.search.force)} {'N m' if what == 'torque' else 'N'}"
+        share = f"{percent(self.share(self.last))} of the drive's"
+        own = listed(self.by_trial())
+        if self.verdict == "effect":
+            rest = f"; {own}" if own else ""
+            approximate = (
+                f"; the law is approximate: {left}, {share}, is left"
+                if self.share(self.last) > MATERIAL
+                else ""
+            )
+            return f"{sized_effects(self.effects)} missing{rest}: {closed}{approximate}."
+        if self.verdict == "unknown":
+            words = f" It {self.law.words}." if self.law else ""
+            best = (
+                f" Best candidate: {effect_names([e.name for e in self.effects])}, which leaves {percent(self.left)} of it."
+                if self.effects
+                else ""
+            )
+            return f"Something that no effect of the catalogue carries acts on the {self.search.model.plant}: {left}, {share}.{words}{best}"
+        if self.verdict == "undecidable":
+            return (
+                f"Too little is left to name: {left}, {share}, though predictions of {signal_name(signal)} {ahead}{seen} miss by "
+                f"{figure(gap.after)} {unit} (noise {figure(gap.floor)}). A friction before it slips (presliding), a sharper law or "
+                "the commands between rows may differ; log at rest, repeat a trial, check the clock."
+            )
+        if own:
+            return f"Trials differ: {own}; {closed}."
+        if self.verdict == "parameters":
+            moved = [
+                f"{path} {estimate_text(m.now)} instead of {figure(m.start)}"
+                for path, m in self.parameters.items()
+                if m.significant
+            ]
+            return f"No effect is missing; parameters are off: {listed(moved[:4])}; {closed}; {left}, {share}, is left."
+        return f"The model agrees with {'these trials' if len(self.named) > 1 else 'this trial'}: {closed}; {left}, {share}, is left."
+
+
+INDEPENDENT = 20.0
+"""Rows that count as one independent value of a smoothed force."""
+
+
+def diagnosis(found: Found) -> Diagnosis:
+    """The answer with its evidence."""
+    base, last = found.path[0], found.last
+    named = found.verdict == "effect"
+    floors = {}
+    for i, channel in enumerate(base.box.channels):
+        column = BY_QUANTITY[found.search.model.rig.signals[channel].name]
+        value, step = (
+            v / SI_FACTORS[column.unit]
+            for v in (base.fit.point.deviations[i], found.search.steps_of_readings[i])
+        )
+        floors[column.name] = Floor(value, "innovations", {"innovations": value}, step, ())
+    chosen = {move.name for move in last.moves}
+    candidates = [
+        Candidate(
+            name,
+            gain,
+            None,
+            float(min(1.0, np.exp(-min(max(gain, 0.0), 600.0)))),
+            0.0,
+            None,
+            True,
+            ADDED if name in chosen else "explains less than its price",
+        )
+        for name, gain in sorted(found.search.gains.items(), key=lambda pair: -pair[1])
+        if TREND not in name and TRIAL not in name
+    ]
+    approximate = found.share(last) > MATERIAL and bool(found.effects)
+    return Diagnosis(
+        verdict=found.verdict,
+        sentence=found.sentence,
+        where=found.where,
+        effects=found.effects if named else (),
+        parameters=found.parameters,
+        gap=found.gap,
+        candidates=tuple(candidates),
+        next_experiment=None,
+        model=found.model,
+        given=found.search.model,
+        approximate=Approximate(found.effects, found.left, found.holds_out(last))
+        if approximate
+        else None,
+        law=found.law if found.verdict == "unknown" or approximate else None,
+        floors=floors,
+        states=found.states,
+        written={name: gap.after for name, gap in found.gap.items()},
+        trials=found.records,
+        steps=(),
+    )
+
+
+def answered(
+    model: Model,
+    named: Sequence[NamedTrial],
+    candidates: Sequence[CandidateEffect] | None,
+    tolerance: Mapping[str, float],
+    seed: int,
+    tell: Callable[[str, int, int], None],
+) -> Diagnosis:
+    """The diagnosis of a free rig.
+
+    Args:
+        model: the model as it came.
+        named: the trials.
+        candidates: effects that may be missing; None: only the model's own parameters are fitted.
+        tolerance: misfit that is good enough (SI), by measurement.
+        seed: of the starts of fits.
+        tell: called with a step's name, what is done of it and its total.
+    Raises:
+        TrialError: trials with fewer readings than a fit needs.
+    """
+    logged = [Logged.of(model, i, each.trial) for i, each in enumerate(named)]
+    search = Search(model, logged, candidates or (), seed=seed, tell=tell)
+    path = [search.base()] if candidates is None else search.run()
+    tell("putting the answer together", 0, 1)
+    limits = {
+        BY_QUANTITY[name].name: value / SI_FACTORS[BY_QUANTITY[name].unit]
+        for name, value in tolerance.items()
+    }
+    return diagnosis(Found(search, path, named, limits, candidates or ()))
+
+
+def path_of(slot: str) -> str:
+    """Path of a slot: with its file unit."""
+    effect, _, stem = slot.partition(".")
+    keys = {own: key for key, own in CATALOGUE[effect].names_in_files().items()}
+    return f"{effect}.{keys[stem]}"
+
+
+def _quantity(slot: str) -> Quantity:
+    effect, _, stem = slot.partition(".")
+    return CATALOGUE[effect].quantities[stem]
+
+
+def _unit(path: str) -> str:
+    effect, _, key = path.partition(".")
+    law = CATALOGUE[effect]
+    return law.quantities[law.names_in_files()[key]].unit
+
+
+def _rms(off: Array) -> float:
+    return float(np.sqrt(np.mean(off**2)))

@@ -1,0 +1,689 @@
+"""Which effects, or parameters that differ by trial, carry the latent force."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
+from pma_gym.discovery.fitting.free_parameters import free_parameters, prior
+from pma_gym.effects import CATALOGUE
+from pma_gym.estimation.logged import Logged
+from pma_gym.estimation.innovations import TREND, TRIAL, GreyBox, Point, Rows, log_likelihood
+from pma_gym.estimation.likelihood_fit import (
+    STEP,
+    Coordinate,
+    Fit,
+    fit,
+    value_of,
+    with_tied,
+    with_values,
+)
+from pma_gym.discovery.grey_box.thresholds import FAINT, LIKE, MOST_EFFECTS, ODD, TRIED
+from pma_gym.plant.model import Model
+from pma_gym.units import Quantity
+
+Array = NDArray[np.float64]
+
+CAREFUL = ((0.3, 0.5, 1.0), (1.0, 0.2, 10.0), (0.5, 0.5, 0.1))
+"""Further starts of a candidate: share of its size, of the latent force, and times its presliding distance."""
+
+SUBSTEP_S, ROUGH_SUBSTEP_S = 1e-3, 3e-4
+"""Longest integration step, without and with dry friction."""
+
+MOST_STEPS = 400_000
+"""Of all trials together; longer steps where they would take more."""
+
+MOST_ROWS = 12_000
+"""Of all trials together: more are averaged in blocks, as long as the motion bends less in one than its noise;
+of what is more still, every second, third ... block is read."""
+
+BENT = 0.2
+"""That bend at most, in standard deviations of a block's noise."""
+
+STARTS, SMOOTH_STARTS = 8, 3
+"""Of the first fit, with and without dry friction, whose likelihood is rugged."""
+
+MOST_TRIALS = 6
+"""With so many trials at most, each is once taken for an odd one: with a large latent force of its own at the start."""
+
+ODD_SHARE = 0.005
+"""Latent force, as a share of the drive's, from which on that is done."""
+
+ALIKE = 0.5
+"""Log likelihood within which three starts have found the same."""
+
+SCATTER = 0.2
+"""Standard deviation of a start's parameters, as a share of them."""
+
+SHARES = (0.1, 0.01, 0.03, 0.003)
+"""Latent force at the starts, as a share of the drive's: small, so that it swallows nothing at first."""
+
+WIDE = 5.0
+"""Standard deviation of the own parameters' priors, in those that the parameters' list has (10 % of them)."""
+
+MOST_DELAY = 20.0
+"""Longest delay, in rows."""
+
+MOST_FACTOR = 5.0
+"""Factor that a parameter of one trial may differ by: beyond it no cable chain jams, and another thing is missing."""
+
+DELAY_ROWS = (0.0, 0.5, 1.0, 2.0, 3.0, 5.0, 8.0, 12.0)
+"""Delays (rows) of which a start takes the likeliest."""
+
+DELAYS = ("drive_delay", "lvdt_delay", "tachometer_delay", "encoder_delay", "gyroscope_delay")
+"""Candidates that are not tried: the delay between command and readings is free in every fit."""
+
+LAGS = ("lvdt_lag", "tachometer_lag", "encoder_lag", "gyroscope_lag")
+"""The same where there is one signal."""
+
+
+@dataclass(frozen=True)
+class Move:
+    """One thing that a model may lack: an effect, or a parameter that differs by trial.
+
+    Attributes:
+        name: of the effect, or the parameter's slot with its mark.
+        promise: gain of log likelihood that the screening promises.
+        numbers: how many it adds.
+        candidate: the effect.
+        probe: its most promising probe.
+        amount: how many times the probe's size.
+        slots: of parameters by trial.
+        start: where its fit begins, if not at what it is added to.
+    """
+
+    name: str
+    promise: float
+    numbers: int
+    candidate: CandidateEffect | None = None
+    probe: int = 0
+    amount: float = 0.0
+    slots: tuple[str, ...] = ()
+    start: Point | None = None
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """A model with what was added, and its fit.
+
+    Attributes:
+        box: its filter.
+        fit: its fit.
+        moves: what was added.
+        rivals: names of moves that would have done as well as the last one.
+    """
+
+    box: GreyBox
+    fit: Fit
+    moves: tuple[Move, ...] = ()
+    rivals: tuple[tuple[str, ...], ...] = ()
+
+
+class Search:
+    """A search for what a model lacks.
+
+    Args:
+        model: the model as it came.
+        logged: the trials.
+        candidates: effects that may be missing.
+        linear: whether commands are linear between rows; None: what is likelier.
+        seed: of the starts.
+        tell: called with what is being done, what is done of it and its total.
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        logged: Sequence[Logged],
+        candidates: Sequence[CandidateEffect],
+        linear: bool | None = None,
+        seed: int = 0,
+        tell: Callable[[str, int, int], None] = lambda step, done, total: None,
+    ) -> None:
+        self.model, self.logged, self.seed, self.tell = model, list(logged), seed, tell
+        self.linear = linear
+        self.channels = [
+            i for i in range(len(model.rig.signals)) if any(each.measures[i] for each in logged)
+        ]
+        # The delay between command and readings is free in every fit, and a lag of the only sensor is no other thing.
+        late = DELAYS if len(self.channels) > 1 else (*DELAYS, *LAGS)
+        self.candidates = [each for each in candidates if each.name not in late]
+        readings = [
+            [each.measured[c][each.counts[c] > 0] for each in logged] for c in self.channels
+        ]
+        self.steps_of_readings = [reading_step(rows) for rows in readings]
+        self.noise = [
+            max(white_noise(rows), s / 12**0.5)
+            for rows, s in zip(readings, self.steps_of_readings, strict=True)
+        ]
+        self.block = self._block(readings)
+        total = sum(len(each.time) for each in logged) / self.block
+        self.stride = max(1, int(total / MOST_ROWS))
+        seconds = sum(float(each.time[-1] - each.time[0]) for each in logged)
+        self.substeps = {
+            rough: max(h, seconds / MOST_STEPS)
+            for rough, h in ((False, SUBSTEP_S), (True, ROUGH_SUBSTEP_S))
+        }
+        self.span = (
+            self.stride
+            * self.block
+            * float(np.median(np.concatenate([np.diff(each.time) for each in logged])))
+        )
+        longest = max(float(each.time[-1] - each.time[0]) for each in logged)
+        self.memory = 4.0 * self.span, max(longest / 5.0, 8.0 * self.span)
+        self.gains: dict[str, float] = {}
+        self._rows: dict[tuple[int, bool], list[Rows]] = {}
+        self.force = self._force()
+
+    def _block(self, readings: Sequence[Sequence[Array]]) -> int:
+        total, block = sum(len(each.time) for each in self.logged), 1
+        while total / block > MOST_ROWS:
+            wider = block + 1
+            bends = [
+                np.sqrt(np.mean(np.concatenate([np.diff(row[::wider], 2) for row in rows]) ** 2))
+                / 24.0
+                for rows in readings
+            ]
+            if any(b > BENT * n / wider**0.5 for b, n in zip(bends, self.noise, strict=True)):
+                break
+            block = wider
+        return block
+
+    def box(self, model: Model, linear: bool | None = None, steps: int = 2) -> GreyBox:
+        """The filter of a model over the trials, with so many integration steps a row at least."""
+        steps = max(steps, int(np.ceil(self.span / self.substeps[is_rough(model)])))
+        linear = bool(self.linear if linear is None else linear)
+        if (steps, linear) not in self._rows:
+            each = [
+                Rows(one, self.channels, steps, linear, self.block, self.stride)
+                for one in self.logged
+            ]
+            self._rows[steps, linear] = each
+        return GreyBox(model, self._rows[steps, linear], self.channels)
+
+    def _force(self) -> float:
+        """Force of the drive (N, N m) at the root mean square of its command."""
+        motor = np.concatenate([each.motor for each in self.logged])
+        middle = float(np.median(motor))
+        level = float(np.sqrt(np.mean((motor - middle) ** 2))) or 1.0
+        (drive,) = [e for e in self.model.effects.values() if e.port == self.model.rig.drive_port]
+        p = self.model.parameters[drive.name]
+        if drive.port == "two_way_drive":
+            return abs(drive.law(middle + level, p) - drive.law(middle, p)) or 1.0
+        names = drive.law.__code__.co_varnames[: drive.law.__code__.co_argcount]
+        at = [{"p": p, "command": c, "spin": 0.0} for c in (middle + level, middle)]
+        return (
+            abs(drive.law(*(at[0][n] for n in names)) - drive.law(*(at[1][n] for n in names)))
+            or 1.0
+        )
+
+    def _gains(self) -> list[str]:
+        """Slots of the drive's gain, which one trial cannot tell from the inertia, but several can from each other."""
+        drives = [e for e in self.model.effects.values() if e.port == self.model.rig.drive_port]
+        return [
+            f"{e.name}.{stem}"
+            for e in drives
+            for stem in e.quantities
+            if stem in ("gain", "torque_constant")
+        ]
+
+    def own(self) -> tuple[list[Coordinate], dict[str, str]]:
+        """Coordinates of the model's own parameters, and slots that follow another one."""
+        numbers = self.box(self.model, False).numbers()
+        coordinates, tied = list[Coordinate](), dict[str, str]()
+        for path in free_parameters(self.model).free:
+            name, quantity = slot(path), _quantity(path)
+            effect, _, stem = name.partition(".")
+            law = self.model.effects[effect]
+            if path in self.model.rig.start_paths.values() or quantity.unit.endswith("/kPa"):
+                continue
+            tie = next((t for t in law.ties if stem in t[1:]), None)
+            if tie and numbers[f"{effect}.{tie[0]}"] == numbers[f"{effect}.{tie[1]}"]:
+                tied |= {name: f"{effect}.{tie[0]}"} if stem == tie[1] else {}
+                continue
+            spread = WIDE * abs(quantity.to_si(prior(self.model, path)) - quantity.to_si(0.0))
+            inertial = tuple(name.split(".")) == self.model.rig.inertia
+            scale = 1.0 if inertial else abs(numbers[name]) or spread
+            lower, upper = quantity.to_si(quantity.lower), quantity.to_si(quantity.upper)
+            coordinates.append(
+                Coordinate(name, scale, inertial, lower, upper, 1.0 if inertial else spread / scale)
+            )
+        for effect in self.model.effects.values():
+            coordinates += [_presliding(effect.name)] if "presliding" in effect.scanned else []
+        return coordinates, tied
+
+    def nuisances(self) -> list[Coordinate]:
+        """Coordinates of the noises, the latent force and the delay."""
+        pairs = zip(self.noise, self.steps_of_readings, strict=True)
+        noise = [
+            Coordinate(f"noise {i}", 1.0, True, max(1e-3 * n, s / 12**0.5), 1e3 * n)
+            for i, (n, s) in enumerate(pairs)
+        ]
+        forces = [
+            Coordinate(f"force {i}", 1.0, True, 1e-6 * self.force, 10.0 * self.force)
+            for i in range(len(self.logged))
+        ]
+        least, most = self.memory
+        memory = Coordinate("memory", 1.0, True, 0.75 * least, most)
+        late = any(effect.port == "drive_delay" for effect in self.model.effects.values())
+        delay = [] if late else [Coordinate("delay", self.span, False, 0.0, MOST_DELAY * self.span)]
+        return [*noise, *forces, memory, *delay]
+
+    def base(self) -> Hypothesis:
+        """The model as it came, fitted."""
+        own, tied = self.own()
+        coordinates = [*own, *self.nuisances()]
+        rough, trials = is_rough(self.model), len(self.logged)
+        count = STARTS if rough else SMOOTH_STARTS
+        kinds = (False, True) if self.linear is None else (self.linear,)
+        fits: dict[bool, list[Fit]] = {linear: [] for linear in kinds}
+
+        def start(k: int, odd: int) -> None:
+            for linear in kinds:
+                self.tell("refitting parameters", k, count)
+                box = self.box(self.model, linear)
+                fits[linear].append(
+                    fit(box, self._begin(box, coordinates, tied, k, odd), coordinates, tied)
+                )
+
+        for k in range(count):
+            start(k, -1)
+            kinds = (max(fits, key=lambda each: max(f.value for f in fits[each])),) if k else kinds
+            values = sorted(f.value for f in fits[kinds[0]])
+            if len(values) > 2 and values[-1] - values[-3] < ALIKE:
+                break
+        (self.linear,) = kinds
+        forces = max(fits[self.linear], key=lambda each: each.value).point.forces
+        if (
+            3 <= trials <= MOST_TRIALS
+            and max(forces) > ODD * min(forces)
+            and max(forces) > ODD_SHARE * self.force
+        ):
+            for odd in range(trials):
+                start(0, odd)
+        best = max(fits[self.linear], key=lambda each: each.value)
+        return Hypothesis(self.box(self.model), best)
+
+    def _begin(
+        self,
+        box: GreyBox,
+        coordinates: Sequence[Coordinate],
+        tied: Mapping[str, str],
+        k: int,
+        odd: int,
+    ) -> Point:
+        """Start number k: the first is the model as it came, the last are those with one odd trial."""
+        generator = np.random.default_rng((self.seed, k))
+        memory = float(np.sqrt(self.memory[0] * self.memory[1])) if k % 2 else self.memory[0]
+        shares = [SHARES[k % 4] if odd < 0 or i != odd else 1.0 for i in range(len(self.logged))]
+        point = Point(
+            box.numbers(), tuple(self.noise), tuple(share * self.force for share in shares), memory
+        )
+        own = [c for c in coordinates if c.name in point.numbers]
+        factors = (
+            np.exp(SCATTER * generator.standard_normal(len(own)))
+            if k and odd < 0
+            else np.ones(len(own))
+        )
+        values = {
+            c.name: float(np.clip(value_of(point, c.name) * f, c.lower, c.upper))
+            for c, f in zip(own, factors, strict=True)
+        }
+        point = with_values(point, with_tied(values, tied))
+        late = [
+            replace(point, delay=rows * self.span)
+            for rows in DELAY_ROWS[: 1 if k == 0 or coordinates[-1].name != "delay" else None]
+        ]
+        return late[int(np.argmax(log_likelihood(box.innovations(late), box.rows)))]
+
+    def white(self, box: GreyBox, points: Sequence[Point]) -> Array:
+        """Innovations over their deviations, shape (points, readings)."""
+        with np.errstate(all="ignore"):
+            rows = [
+                (errors / np.sqrt(spreads)).reshape(len(points), -1)[:, trial.there.ravel()]
+                for (errors, spreads), trial in zip(box.innovations(points), box.rows, strict=True)
+            ]
+        return np.concatenate(rows, axis=1)
+
+    def moves(self, now: Hypothesis) -> list[Move]:
+        """All that may be added, by what it promises less its price, the most first."""
+        fitted, box = now.fit, now.box
+        own = {c.name for c in fitted.coordinates}
+        drive = [
+            Coordinate(name, abs(fitted.point.numbers[name]))
+            for name in self._gains()
+            if name not in own
+        ]
+        mean = [
+            *drive,
+            *(c for c in fitted.coordinates if " " not in c.name and c.name != "memory"),
+        ]
+        beside = [
+            with_values(
+                fitted.point, with_tied({c.name: c.value(c.of(fitted.point) + STEP)}, fitted.tied)
+            )
+            for c in mean
+        ]
+        white = self.white(box, [fitted.point, *beside])
+        error, slopes = white[0], np.nan_to_num((white[1:] - white[0]) / STEP)
+        basis = np.linalg.qr(slopes[len(drive) :].T)[0]
+
+        def beyond(rows: Array) -> Array:
+            return rows - (rows @ basis) @ basis.T
+
+        left = beyond(error)
+        moves = [
+            *self._effects(now, error, left, beyond),
+            *self._by_trial(now, mean, slopes, left, beyond),
+        ]
+        price = 0.5 * np.log(len(error))
+        return sorted(moves, key=lambda move: move.numbers * price - move.promise)
+
+    def _effects(
+        self, now: Hypothesis, error: Array, left: Array, beyond: Callable[[Array], Array]
+    ) -> list[Move]:
+        added = {move.candidate.name for move in now.moves if move.candidate}
+        moves = []
+        for number, candidate in enumerate(self.candidates):
+            self.tell("screening effects", number, len(self.candidates))
+            if candidate.name in added:
+                continue
+            box = self.box(candidate.beside(now.box.model), steps=now.box.rows[0].steps)
+            whole = replace(now.fit.point, numbers={**box.numbers(), **now.fit.point.numbers})
+            probes = self.white(
+                box, [with_values(whole, _values(candidate.paths, row)) for row in candidate.probes]
+            )
+            best = Move(candidate.name, -np.inf, 0)
+            for i, row in enumerate(probes):
+                change = beyond(row - error)
+                square = float(change @ change)
+                if not np.isfinite(square) or square < 1e-9:
+                    continue
+                amount = -float(left @ change) / square
+                if amount < 0.0 and not candidate.signs[i]:
+                    continue
+                if (promise := 0.5 * amount**2 * square) > best.promise:
+                    best = Move(
+                        candidate.name, promise, len(self._added(candidate)), candidate, i, amount
+                    )
+            moves += [best] if best.candidate else []
+        return moves
+
+    def _by_trial(
+        self,
+        now: Hypothesis,
+        mean: Sequence[Coordinate],
+        slopes: Array,
+        left: Array,
+        beyond: Callable[[Array], Array],
+    ) -> list[Move]:
+        """Each parameter in one trial alone, with a trend over the trials."""
+        count = len(now.box.rows)
+        if count < 3:
+            return []
+        of = np.concatenate(
+            [np.full(int(trial.there.sum()), i) for i, trial in enumerate(now.box.rows)]
+        )
+        moves = []
+        for c, slope in zip(mean, slopes, strict=True):
+            if (
+                c.logarithmic
+                and c.name.endswith("presliding")
+                or c.name in ("delay",)
+                or TREND in c.name
+                or TRIAL in c.name
+            ):
+                continue
+            columns = {f"{c.name}{TREND}": slope * now.box.order[of]}
+            columns |= {f"{c.name}{TRIAL}{i}": slope * (of == i) for i in range(count)}
+            for name, column in columns.items():
+                change = beyond(column)
+                square = float(change @ change)
+                if square > 1e-9:
+                    promise = 0.5 * float(left @ change) ** 2 / square
+                    moves.append(Move(name, promise, 1, slots=(name,)))
+        return moves
+
+    def _added(self, candidate: CandidateEffect) -> list[str]:
+        """Paths of a candidate that are fitted with it: ties and further terms stay out."""
+        law = CATALOGUE[candidate.effect]
+        apart = {stem for tie in law.ties for stem in tie[1:]} | {
+            stem for term in law.terms for stem in term
+        }
+        return [
+            path for path in candidate.fitted_paths if slot(path).partition(".")[2] not in apart
+        ]
+
+    def tried(self, now: Hypothesis, move: Move, careful: bool = False) -> Hypothesis:
+        """Fit with a move added; `careful` from more starts."""
+        candidate = move.candidate
+        if candidate is None:
+            return self._varied(now, move)
+        box = self.box(candidate.beside(now.box.model), steps=now.box.rows[0].steps)
+        law, tied = CATALOGUE[candidate.effect], dict(now.fit.tied)
+        tied |= {f"{candidate.effect}.{tie[1]}": f"{candidate.effect}.{tie[0]}" for tie in law.ties}
+        absent = _values(candidate.paths, candidate.absent)
+        at = _values(
+            candidate.paths, candidate.grown(move.probe, float(np.clip(move.amount, -20.0, 20.0)))
+        )
+        at |= {
+            n: absent[n]
+            for term in law.terms
+            for n in [f"{candidate.effect}.{term[0]}"]
+            if n in absent
+        }
+        lower, upper = candidate.bounds
+        reach = np.abs(candidate.probes - candidate.absent).max(axis=0)
+        more = []
+        for path, low, high, far in zip(candidate.paths, lower, upper, reach, strict=True):
+            if path in self._added(candidate):
+                zero, size, least, most = (
+                    _quantity(path).to_si(float(v)) for v in (0.0, far, low, high)
+                )
+                more.append(Coordinate(slot(path), abs(size - zero) or 1.0, False, least, most))
+        more += [_presliding(candidate.effect)] if "presliding" in law.scanned else []
+        here = move.start or now.fit.point
+        whole = replace(here, numbers={**box.numbers(), **here.numbers})
+        best = None
+        starts = ((1.0, 0.5, 1.0), (0.5, 0.5, 10.0)) if law.scanned else ((1.0, 0.5, 1.0),)
+        for part, share, wide in (*starts, *(CAREFUL if careful else ())):
+            values = dict(at)
+            for c in more:
+                if c.name in absent:
+                    values[c.name] = absent[c.name] + part * (at[c.name] - absent[c.name])
+                else:
+                    values[c.name] = float(np.clip(whole.numbers[c.name] * wide, c.lower, c.upper))
+            start = with_values(whole, with_tied(values, tied))
+            made = fit(box, self._weaker(start, share), [*now.fit.coordinates, *more], tied)
+            best = made if best is None or made.value > best.value else best
+        assert best is not None
+        return Hypothesis(box, best, (*now.moves, move), now.rivals)
+
+    def _weaker(self, point: Point, share: float) -> Point:
+        """A point with a share of its latent force, in no trial more than thrice the least one."""
+        most = 3.0 * min(point.forces) if share < 1.0 else max(point.forces)
+        return replace(
+            point,
+            forces=tuple(max(share * min(each, most), 1e-6 * self.force) for each in point.forces),
+        )
+
+    def _varied(self, now: Hypothesis, move: Move) -> Hypothesis:
+        """Fit with a parameter that differs by trial, from more starts where the latent force of that trial stands out."""
+        (name,) = move.slots
+        forces = np.array(now.fit.point.forces)
+        odd = name.endswith(f"{TRIAL}{int(np.argmax(forces))}") and forces.max() > ODD * float(
+            np.median(forces)
+        )
+        mark = TREND if TREND in name else TRIAL
+        base, _, number = name.partition(mark)
+        value = value_of(now.fit.point, base)
+        old = next((c for c in now.fit.coordinates if c.name == base), Coordinate(base, abs(value)))
+        scale = abs(value) if old.logarithmic else old.scale
+        ends = sorted((value / MOST_FACTOR, value * MOST_FACTOR))
+        alone = max(old.lower, ends[0]), min(old.upper, ends[1])
+        first, bounds = (0.0, (-np.inf, np.inf)) if mark == TREND else (value, alone)
+        tied = dict(now.fit.tied)
+        followers = [slot_ for slot_, of in now.fit.tied.items() if of == base]
+        tied |= {f"{follower}{mark}{number}": name for follower in followers}
+        coordinates = [*now.fit.coordinates, Coordinate(name, scale, False, *bounds)]
+        best = None
+        further = ((0.5, 0.1), (1.0, 0.1), (-0.3, 0.1)) if odd and mark == TRIAL else ()
+        for amount, share in ((0.0, 0.5), *further):
+            there = float(np.clip(first + amount * abs(value), *bounds))
+            start = with_values(now.fit.point, with_tied({name: there}, tied))
+            made = fit(now.box, self._weaker(start, share), coordinates, tied)
+            best = made if best is None or made.value > best.value else best
+        assert best is not None
+        return Hypothesis(now.box, best, (*now.moves, move), now.rivals)
+
+    def _worth_a_fit(self, now: Hypothesis) -> list[Move]:
+        """The moves that promise half their price; where there is a latent force, the first ones whatever they promise,
+        and each parameter of a trial whose latent force stands out."""
+        moves, forces = self.moves(now), np.array(now.fit.point.forces)
+        if not now.moves:
+            # A model that lacks much is bent by its fit: what it lacks is looked for from the model as it came too.
+            fresh = [
+                replace(move, start=self.unmoved.fit.point)
+                for move in self.moves(self.unmoved)
+                if move.candidate
+            ]
+            if max(forces) > FAINT * self.force:
+                moves = [*moves[:TRIED], *fresh[:TRIED], *moves[TRIED:]]
+                return moves[: 2 * TRIED] + self._odd(now, moves[2 * TRIED :])
+        readings = sum(int(trial.there.sum()) for trial in now.box.rows)
+        price = 0.5 * (0.5 * np.log(readings) + np.log(len(moves)))
+        if max(forces) < FAINT * self.force:
+            return [move for move in moves[:TRIED] if move.promise > price]
+        return [*moves[:TRIED], *self._odd(now, moves[TRIED:])]
+
+    def _odd(self, now: Hypothesis, moves: Sequence[Move]) -> list[Move]:
+        """Each parameter of the trial whose latent force stands out."""
+        forces = np.array(now.fit.point.forces)
+        odd = int(np.argmax(forces))
+        alone = len(forces) > 2 and forces[odd] > ODD * float(np.median(forces))
+        return [move for move in moves if alone and move.name.endswith(f"{TRIAL}{odd}")]
+
+    def _unmoved(self, base: Hypothesis) -> Hypothesis:
+        """The model's own parameters as they came, with noise and latent force fitted."""
+        own = base.box.numbers()
+        free = [c for c in base.fit.coordinates if c.name not in own and c.name != "delay"]
+        start = Point(
+            own, base.fit.point.deviations, (0.1 * self.force,) * len(self.logged), self.memory[0]
+        )
+        made = fit(base.box, start, free, {})
+        return replace(
+            base, fit=replace(made, coordinates=base.fit.coordinates, tied=base.fit.tied)
+        )
+
+    def _at_end(self, each: Hypothesis) -> bool:
+        """Whether a parameter of one trial has gone as far as it may."""
+        for name in each.moves[-1].slots:
+            coordinate, value = each.fit.coordinates[-1], value_of(each.fit.point, name)
+            if TRIAL in name and not coordinate.lower * 1.01 < value < coordinate.upper * 0.99:
+                return True
+        return False
+
+    def _again(self, now: Hypothesis, larger: Hypothesis) -> Hypothesis:
+        """A hypothesis fitted again from where a larger one ended."""
+        values = {c.name: value_of(larger.fit.point, c.name) for c in now.fit.coordinates}
+        box, tied = self.box(now.box.model, steps=larger.box.rows[0].steps), now.fit.tied
+        made = [
+            fit(box, with_values(now.fit.point, with_tied(values, tied)), now.fit.coordinates, tied)
+        ]
+        made += (
+            [fit(box, now.fit.point, now.fit.coordinates, tied)]
+            if box.rows is not now.box.rows
+            else [now.fit]
+        )
+        return replace(now, box=box, fit=max(made, key=lambda each: each.value))
+
+    def price(self, one: Hypothesis, other: Hypothesis) -> float:
+        """Log likelihood that a larger hypothesis must gain over a smaller: BIC's, and that of the search."""
+        readings = sum(int(trial.there.sum()) for trial in one.box.rows)
+        numbers = len(one.fit.coordinates) - len(other.fit.coordinates)
+        looked = len(self.candidates) + len(self.logged) * len(self.own()[0])
+        moves = len(one.moves) - len(other.moves)
+        return 0.5 * numbers * np.log(readings) + moves * np.log(looked)
+
+    def run(self) -> list[Hypothesis]:
+        """From the model as it came to the last hypothesis that is worth its price."""
+        path = [self.base()]
+        self.unmoved = self._unmoved(path[0])
+        for stage in range(MOST_EFFECTS):
+            now = path[-1]
+            moves = self._worth_a_fit(now)
+            tried = []
+            for number, move in enumerate(moves):
+                self.tell(f"effect {stage + 1}", number, len(moves))
+                tried.append(self.tried(now, move))
+                self.gains.setdefault(move.name, tried[-1].fit.value - now.fit.value)
+            tried = [h for h in tried if not self._at_end(h)]
+            worth = sorted(tried, key=lambda h: self.price(h, now) - h.fit.value)
+            if worth and worth[0].fit.value < now.fit.value + self.price(worth[0], now):
+                break
+            for at, each in enumerate(worth[:2]):
+                again = self.tried(now, each.moves[-1], careful=True)
+                worth[at] = again if again.fit.value > each.fit.value else each
+            worth.sort(key=lambda h: self.price(h, now) - h.fit.value)
+            if worth:
+                # The smaller hypothesis begins where the larger one ended: neither is ahead by its starts.
+                now = path[-1] = self._again(now, worth[0])
+            if not worth or worth[0].fit.value < now.fit.value + self.price(worth[0], now) + LIKE:
+                break
+            least = worth[0].fit.value - self.price(worth[0], now) - LIKE
+            rivals = tuple(
+                h.moves[-1].name for h in worth[1:] if h.fit.value - self.price(h, now) > least
+            )
+            path.append(replace(worth[0], rivals=(*now.rivals, rivals)))
+        return path
+
+
+def is_rough(model: Model) -> bool:
+    """Whether a model has dry friction, or another law of the way."""
+    return any(effect.rate_independent_law for effect in model.effects.values())
+
+
+def reading_step(rows: Sequence[Array]) -> float:
+    """Step that readings keep to (SI); 0 where they keep to none."""
+    levels = np.unique(np.concatenate(rows))
+    apart = np.diff(levels)
+    apart = apart[apart > 1e-9 * max(float(np.abs(levels).max()), 1e-300)]
+    if not len(apart):
+        return 0.0
+    step = float(np.median(apart[apart < 1.5 * apart.min()]))
+    whole = np.abs(apart / step - np.round(apart / step)) < 0.1
+    return step if whole.mean() > 0.9 else 0.0
+
+
+def white_noise(rows: Sequence[Array]) -> float:
+    """Standard deviation of white noise by third differences, whose sum of squared weights is 20."""
+    third = np.concatenate([np.diff(row, 3) for row in rows if len(row) > 3])
+    robust = 1.4826 * float(np.median(np.abs(third)))
+    return max(robust, 0.3 * float(np.std(third)), 1e-12) / 20**0.5
+
+
+def slot(path: str) -> str:
+    """`effect.parameter` of a path."""
+    effect, _, key = path.partition(".")
+    return f"{effect}.{CATALOGUE[effect].names_in_files()[key]}"
+
+
+def _quantity(path: str) -> Quantity:
+    effect, _, stem = slot(path).partition(".")
+    return CATALOGUE[effect].quantities[stem]
+
+
+def _values(paths: Sequence[str], row: Array) -> dict[str, float]:
+    """Values (SI) by slot of values in file units."""
+    return {
+        slot(path): _quantity(path).to_si(float(value))
+        for path, value in zip(paths, row, strict=True)
+    }
+
+
+def _presliding(effect: str) -> Coordinate:
+    quantity = CATALOGUE[effect].quantities["presliding"]
+    low, high = quantity.to_si(quantity.lower), quantity.to_si(quantity.upper)
+    return Coordinate(f"{effect}.presliding", 1.0, True, low, high, 2.0)

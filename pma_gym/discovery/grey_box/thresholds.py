@@ -1,0 +1,38 @@
+"""The numbers by which the grey box decides, each with its derivation. Numbers of the numerics stand beside them."""
+
+MATERIAL = 0.02
+"""Share of the drive's force (root mean square) above which a latent force matters: assumption, what the force constant of a
+drive is known to. A latent force below it is `agrees` or `parameters`, however significant."""
+
+LIKE = 3.0
+"""Difference of log likelihood, after the price, within which two hypotheses are rivals: odds of 20 to 1."""
+
+LEFT = 0.5
+"""Share of the latent force (mean square) that effects may leave and still be named: they carry at least half."""
+
+MOST_EFFECTS = 3
+"""Effects at most: a beam of more was never right on data whose effects are known (design)."""
+
+TRIED = 5
+"""Candidates that are fitted after each screening, the most promising ones."""
+
+HORIZON = 0.25
+"""Share of the shortest trial over which a free rig is predicted ahead, at most `HORIZON_S`."""
+
+HORIZON_S = 1.0
+"""Longest prediction (s): what a controller of such a rig plans ahead; assumption."""
+
+CONFIDENCE = 1.96
+"""Standard deviations of a 95 % interval."""
+
+ODD = 3.0
+"""Times the median of all trials' latent forces from which on a trial stands out."""
+
+FAINT = 0.002
+"""Share of the drive's force below which a latent force asks for no candidate that promises too little."""
+
+ROWS_LATE = 0.05
+"""Rows of the log below which a delay is a matter of how commands are written between rows, not of the rig."""
+
+NOISES = 3.0
+"""Noises that predictions may miss by where the model is said to be right, as the campaign on hidden effects counts it."""

@@ -1,0 +1,420 @@
+"""Innovations of logged trials by a model with a latent force, at many points at once."""
+
+import ctypes
+from collections.abc import Callable, Mapping, Sequence
+from copy import copy
+from dataclasses import dataclass
+from typing import Annotated, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pma_gym.codegen.machine.control import Module
+from pma_gym.codegen.machine.native import compiled, simd_lanes
+from pma_gym.effects.effect import Effect
+from pma_gym.effects.slide.coulomb_friction import friction_path
+from pma_gym.estimation.logged import Logged
+from pma_gym.integrator.filter_kernel import FilterEquations, parameter_slots, write_filter
+from pma_gym.plant.composition import PlantEquations
+from pma_gym.plant.model import Model
+from pma_gym.plant.program import parameter_names, structure
+from pma_gym.units import Quantity
+
+Array = NDArray[np.float64]
+
+LATENT = "latent_force"
+
+PORTS = {"slide": "slide_force", "joint": "joint_torque"}
+"""Where the latent force acts, by rig: drive and load act on one mass, so they are one place."""
+
+SPEEDS = {"slide": "velocity", "joint": "spin"}
+"""The state that is the speed, by rig."""
+
+TREND, TRIAL = "~", "@"
+"""Marks of a parameter's further numbers: `slot~` is its change from trial to trial, `slot@2` its value in trial 2."""
+
+FIRST_ROWS = 8
+"""Readings that a first speed is taken from."""
+
+
+class LatentForce(NamedTuple):
+    """Parameters of the latent force."""
+
+    memory_time: Annotated[float, Quantity("s", 1e-4, 1e3, "assumption: 0.05", usual=0.05)]
+
+
+def _force(memory):  # noqa: ANN001, ANN202
+    return memory
+
+
+def _decay(p):  # noqa: ANN001, ANN202
+    return 0.0, 1.0 / p.memory_time
+
+
+@dataclass(frozen=True)
+class Kernel:
+    """The compiled filter of one structure.
+
+    Attributes:
+        call: the compiled function, see `filter_kernel.ARGUMENTS`.
+        slots: names of the parameters that it takes.
+        states: names of its states.
+        width: lanes.
+    """
+
+    call: Callable
+    slots: tuple[str, ...]
+    states: tuple[str, ...]
+    width: int
+
+    @property
+    def size(self) -> int:
+        """Numbers of a mean and a covariance."""
+        n = len(self.states)
+        return n + n * (n + 1) // 2
+
+
+def equations(model: Model, channels: Sequence[int]) -> FilterEquations:
+    """The filter's arithmetic for a model and the signals that are read."""
+    latent = Effect(LATENT, PORTS[model.plant], LatentForce, law=_force, rate=_decay)
+    eq = PlantEquations(
+        {**model.effects, LATENT: latent}, {**model.parameters, LATENT: LatentForce(1.0)}, "zoh"
+    )
+    model.rig.write_equations(eq)
+    eq.finish()
+    known = {state.name: state.value for state in eq.states}
+    signals = [model.rig.signals[channel] for channel in channels]
+    readings = [known.get(f"lag_{signal.sensor}", eq.outputs[signal.name]) for signal in signals]
+    bristles = [
+        n
+        for e in model.effects.values()
+        if e.rate_independent_law is friction_path
+        for n in e.memory_names
+    ]
+    return FilterEquations(eq, f"memory_{LATENT}", readings, bristles)
+
+
+_kernels: dict[tuple[str, ...], Kernel] = {}
+
+
+def kernel(model: Model, channels: Sequence[int], keeps: bool = False) -> Kernel:
+    """The compiled filter of a model's structure; one that keeps what a smoother needs has one lane."""
+    width = 1 if keeps else simd_lanes()
+    key = ("grey box", *structure(model), *map(str, channels), str(width), str(keeps))
+    if key not in _kernels:
+        made = equations(model, channels)
+
+        def build() -> Module:
+            module = Module()
+            write_filter(module, made, width, keeps)
+            return module
+
+        library = compiled(key, build, f"filter of {model.name}", brief=True)
+        call = library.function("innovations", [ctypes.c_int64] * 2 + [ctypes.c_void_p] * 7)
+        states = tuple(state.name for state in made.states)
+        _kernels[key] = Kernel(call, tuple(parameter_slots(made, keeps)), states, width)
+    return _kernels[key]
+
+
+@dataclass(frozen=True)
+class Point:
+    """Values that a filter runs with.
+
+    Attributes:
+        numbers: the model's parameters (SI) by slot, with those of single trials and trends.
+        deviations: standard deviation of each read signal's noise (SI).
+        forces: standard deviation of the latent force in each trial (N, N m).
+        memory: how long it remembers (s).
+        delay: of the command (s).
+    """
+
+    numbers: Mapping[str, float]
+    deviations: tuple[float, ...]
+    forces: tuple[float, ...]
+    memory: float
+    delay: float = 0.0
+
+
+class Rows:
+    """One trial as the filter reads it: blocks of rows as one reading each, commands as means over steps.
+
+    Args:
+        logged: the trial.
+        channels: signals that are read.
+        steps: integration steps between two blocks.
+        linear: whether commands are linear between rows instead of held.
+        block: rows of a block.
+        stride: of so many blocks one is read.
+    """
+
+    def __init__(
+        self,
+        logged: Logged,
+        channels: Sequence[int],
+        steps: int,
+        linear: bool,
+        block: int,
+        stride: int = 1,
+    ) -> None:
+        self.steps = steps
+        starts = np.arange(0, len(logged.time), block)
+        self.sizes = np.diff(np.append(starts, len(logged.time)))
+        self.time = np.add.reduceat(np.asarray(logged.time, float), starts) / self.sizes
+        self.readings = np.zeros((len(starts), len(channels), 2))
+        for i, channel in enumerate(channels):
+            counts = np.add.reduceat(logged.counts[channel], starts)
+            total = np.add.reduceat(logged.measured[channel] * logged.counts[channel], starts)
+            self.readings[:, i, 0] = total / np.maximum(counts, 1.0)
+            self.readings[:, i, 1] = counts == self.sizes
+        self.time, self.readings = (
+            self.time[::stride],
+            np.ascontiguousarray(self.readings[::stride]),
+        )
+        self.there = self.readings[:, :, 1] > 0
+        spans = np.diff(self.time)
+        self.lengths = np.concatenate([[0.0], spans / steps])
+        self._motor, self._at = np.asarray(logged.motor, float), np.asarray(logged.time, float)
+        self._linear = linear
+        self._sums = np.concatenate([[0.0], np.cumsum(self._motor[:-1] * np.diff(self._at))])
+        edges = self.time[:-1, None] + spans[:, None] * (np.arange(steps + 1) / steps)
+        self._from, self._to = edges[:, :-1], edges[:, 1:]
+        self._known: dict[float, Array] = {}
+        self._begun: dict[tuple[int | None, int | None], tuple[float, float, float]] = {}
+
+    @property
+    def first(self) -> float:
+        """Command in the first row."""
+        return float(self._motor[0])
+
+    def commands(self, delay: float) -> Array:
+        """Mean command over each step, late by a delay; shape (rows, steps)."""
+        if delay not in self._known:
+            if len(self._known) > MOST_KEPT:
+                self._known.clear()
+            # A linear command is as in the step's middle; one that is held has a linear integral.
+            middle = 0.5 * (self._from + self._to) - delay
+            mean = np.interp(middle, self._at, self._motor) if self._linear else self._mean(delay)
+            self._known[delay] = np.concatenate([np.full((1, self.steps), self.first), mean])
+        return self._known[delay]
+
+    def _mean(self, delay: float) -> Array:
+        first, last = (self._integral(edge - delay) for edge in (self._from, self._to))
+        return (last - first) / (self._to - self._from)
+
+    def _integral(self, at: Array) -> Array:
+        inside = np.interp(at, self._at, self._sums)
+        return (
+            inside
+            + self.first * np.minimum(at - self._at[0], 0.0)
+            + self._motor[-1] * np.maximum(at - self._at[-1], 0.0)
+        )
+
+    def begin(self, position: int | None, speed: int | None) -> tuple[float, float, float]:
+        """First position, first speed and the speed's standard deviation, from the first readings."""
+        if (position, speed) not in self._begun:
+            self._begun[position, speed] = self._first(position, speed)
+        return self._begun[position, speed]
+
+    def _first(self, position: int | None, speed: int | None) -> tuple[float, float, float]:
+        first, motion, spread = 0.0, 0.0, 0.0
+        if position is not None:
+            there = np.flatnonzero(self.there[:, position])[:FIRST_ROWS]
+            y, t = self.readings[there, position, 0], self.time[there]
+            first, motion = float(y[0]), float(np.polyfit(t - t[0], y, 1)[0])
+            spread = (float(np.ptp(y)) + 1e-12) / (t[-1] - t[0])
+        if speed is not None:
+            there = np.flatnonzero(self.there[:, speed])[:FIRST_ROWS]
+            y = self.readings[there, speed, 0]
+            motion, spread = float(y[0]), float(np.std(y)) + 1e-12
+        return first, motion, spread
+
+
+MOST_KEPT = 32
+"""Delays whose commands are kept."""
+
+
+@dataclass(frozen=True)
+class Kept:
+    """What a smoother needs of one trial: means (rows, n), covariances and transitions (rows, n, n)."""
+
+    states: tuple[str, ...]
+    predicted: Array
+    spread: Array
+    corrected: Array
+    certain: Array
+    transition: Array
+
+
+class GreyBox:
+    """A model's filter over trials.
+
+    Args:
+        model: the model.
+        rows: the trials.
+        channels: signals that are read.
+    """
+
+    def __init__(self, model: Model, rows: Sequence[Rows], channels: Sequence[int]) -> None:
+        self.model, self.rows, self.channels = model, list(rows), tuple(channels)
+        self.kernel = kernel(model, channels)
+        self.order = np.arange(len(rows)) - 0.5 * (len(rows) - 1)
+
+    def numbers(self) -> dict[str, float]:
+        """The model's own parameters (SI) by slot."""
+        return dict(zip(parameter_names(self.model), self.model.vector().tolist(), strict=True))
+
+    def innovations(
+        self, points: Sequence[Point], rows: Sequence[Rows] | None = None
+    ) -> list[tuple[Array, Array]]:
+        """Innovations and their variances of each trial, shape (points, rows, signals) each."""
+        width, results = self.kernel.width, []
+        for number, trial in enumerate(rows or self.rows):
+            shape = (len(points), len(trial.time), len(self.channels))
+            errors, spreads = np.empty(shape), np.empty(shape)
+            for first in range(0, len(points), width):
+                some = list(points[first : first + width])
+                out = self._run(self.kernel, number, trial, some + [some[-1]] * (width - len(some)))
+                errors[first : first + width] = np.moveaxis(out[:, :, 0, : len(some)], -1, 0)
+                spreads[first : first + width] = np.moveaxis(out[:, :, 1, : len(some)], -1, 0)
+            results.append((errors, spreads))
+        return results
+
+    def kept(self, number: int, point: Point) -> Kept:
+        """Means, covariances and transitions of one trial."""
+        k = kernel(self.model, self.channels, keeps=True)
+        n, s, trial = len(k.states), k.size, self.rows[number]
+        room = np.empty((len(trial.time), 2 * s + n * n))
+        self._run(k, number, trial, [point], room)
+        lower = np.tril_indices(n)
+
+        def full(flat: Array) -> Array:
+            out = np.zeros((len(flat), n, n))
+            out[:, lower[0], lower[1]] = out[:, lower[1], lower[0]] = flat
+            return out
+
+        transition = room[:, 2 * s :].reshape(-1, n, n)
+        return Kept(
+            k.states,
+            room[:, :n],
+            full(room[:, n:s]),
+            room[:, s : s + n],
+            full(room[:, s + n : 2 * s]),
+            transition,
+        )
+
+    def _run(
+        self,
+        k: Kernel,
+        number: int,
+        trial: Rows,
+        points: Sequence[Point],
+        kept: Array | None = None,
+    ) -> Array:
+        commands = np.stack([trial.commands(point.delay) for point in points], axis=-1)
+        parameters = np.stack([self._vector(point, k.slots, number) for point in points], axis=-1)
+        start = np.stack([self._start(trial, point, number, k.states) for point in points], axis=-1)
+        out = np.empty((len(trial.time), len(self.channels), 2, len(points)))
+        arrays = [
+            np.ascontiguousarray(a)
+            for a in (trial.lengths, commands, trial.readings, parameters, start)
+        ]
+        addresses = [a.ctypes.data for a in (*arrays, out)]
+        k.call(len(trial.time), trial.steps, *addresses, 0 if kept is None else kept.ctypes.data)
+        return out
+
+    def _vector(self, point: Point, slots: Sequence[str], number: int) -> Array:
+        own = {
+            f"{LATENT}.memory_time": point.memory,
+            "process_noise": 2.0 * point.forces[number] ** 2 / point.memory,
+        }
+        own |= {f"variance {i}": value**2 for i, value in enumerate(point.deviations)}
+        return np.array(
+            [own[s] if s in own else value_in_trial(point, s, number, self.order) for s in slots]
+        )
+
+    def _start(self, trial: Rows, point: Point, number: int, states: Sequence[str]) -> Array:
+        """Mean and covariance at a trial's first row."""
+        signals, plant = self.model.rig.signals, self.model.plant
+        position, speed = (signal.name for signal in signals[:2])
+        where = {signals[channel].name: i for i, channel in enumerate(self.channels)}
+        first, motion, spread = trial.begin(where.get(position), where.get(speed))
+        level = 2.0 * point.deviations[where[position]] if position in where else 0.0
+        at = {
+            position: (first, level),
+            SPEEDS[plant]: (motion, spread),
+            f"memory_{LATENT}": (0.0, point.forces[number]),
+        }
+        at |= {
+            f"lag_{signals[0].sensor}": (first, level),
+            f"lag_{signals[1].sensor}": (motion, spread),
+        }
+        for effect in self.model.effects.values():
+            for name in effect.memory_names:
+                late = effect.port in ("drive_delay", "drive_lag")
+                at[name] = (
+                    (self.asked(trial.first), 0.0)
+                    if late
+                    else (0.0, BRISTLE if effect.rate_independent_law else 0.0)
+                )
+        pairs = [at.get(name, (0.0, 0.0)) for name in states]
+        covariance = np.diag([deviation**2 for _, deviation in pairs])
+        return np.concatenate(
+            [[mean for mean, _ in pairs], covariance[np.tril_indices(len(states))]]
+        )
+
+    def asked(self, command: float) -> float:
+        """What the drive asks for at a command (N; else the command itself)."""
+        drive = self.model.effects.get("two_way_drive")
+        return (
+            command
+            if drive is None
+            else float(drive.law(command, self.model.parameters[drive.name]))
+        )
+
+
+BRISTLE = 3.0**-0.5
+"""Standard deviation of a bristle's first deflection, which may be anything from -1 to 1."""
+
+
+def counted(rows: Rows, counts: NDArray[np.bool_]) -> Rows:
+    """The same trial with only some of its rows read; innovations are of all."""
+    other = copy(rows)
+    other.readings = rows.readings.copy()
+    other.readings[:, :, 1] *= counts[:, None]
+    return other
+
+
+def predictions(box: GreyBox, point: Point, horizon: float) -> list[Array]:
+    """What a filter expects a horizon ahead: each window (s) from the readings of the one before; shape (rows, signals) each."""
+    expected = []
+    windows = [((trial.time - trial.time[0]) / horizon).astype(int) % 2 == 0 for trial in box.rows]
+    for odd in (False, True):
+        rows = [
+            counted(trial, window != odd) for trial, window in zip(box.rows, windows, strict=True)
+        ]
+        results = box.innovations([point], rows)
+        expected.append(
+            [
+                t.readings[:, :, 0] - errors[0]
+                for t, (errors, _) in zip(box.rows, results, strict=True)
+            ]
+        )
+    return [
+        np.where(window[:, None], late, early)
+        for window, early, late in zip(windows, *expected, strict=True)
+    ]
+
+
+def value_in_trial(point: Point, slot: str, number: int, order: Array) -> float:
+    """A parameter's value in one trial."""
+    value = point.numbers.get(f"{slot}{TRIAL}{number}", point.numbers[slot])
+    return value + point.numbers.get(f"{slot}{TREND}", 0.0) * order[number]
+
+
+def log_likelihood(results: Sequence[tuple[Array, Array]], rows: Sequence[Rows]) -> Array:
+    """Log likelihood of each point less a constant, shape (points,); minus infinity where a filter fails."""
+    total = np.zeros(len(results[0][0]))
+    with np.errstate(all="ignore"):
+        for (errors, spreads), trial in zip(results, rows, strict=True):
+            total -= 0.5 * ((errors**2 / spreads + np.log(spreads)) * trial.there).sum(axis=(1, 2))
+    return np.where(np.isfinite(total), total, -np.inf)

@@ -1,0 +1,212 @@
+"""Greatest likelihood of the innovations, by Fisher scoring.
+
+The score of a reading with innovation e and variance S is -(e / S) e' - (1 - e^2 / S) S' / (2 S), its expected information
+e' e' / S + S' S' / (2 S^2). Derivatives come from points that lie a small step away, all of them in the lanes of one run; so do
+the steps of eight damping factors (Levenberg and Marquardt), of which the best is taken.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pma_gym.estimation.innovations import GreyBox, Point, log_likelihood
+
+Array = NDArray[np.float64]
+
+STEP = 1e-4
+"""Step of derivatives, in units of a coordinate."""
+
+MOST_ITERATIONS, LEAST_GAIN = 40, 0.05
+"""Of a fit; it ends where an iteration gains less."""
+
+FACTORS = (0.0, 1.0, 10.0, 100.0, 1e3, 1e4, 1e5, 1e6)
+"""Damping of the steps that are tried at once, in units of the present one."""
+
+WIDEST = 3.0
+"""Longest step, in units of a coordinate."""
+
+BLOCKS = 60
+"""Pieces of all readings whose scores are taken as independent of each other, for the intervals."""
+
+OTHERS = ("memory", "delay")
+"""Numbers of a point that are no parameters of its model."""
+
+
+@dataclass(frozen=True)
+class Coordinate:
+    """One free number of a fit.
+
+    Attributes:
+        name: slot of a parameter, `noise N`, `force N` (of trial N), or one of `OTHERS`.
+        scale: size (SI) of one unit.
+        logarithmic: whether the coordinate is the logarithm.
+        lower: least value (SI).
+        upper: greatest value (SI).
+        prior: standard deviation about the start, in its own unit; 0 for none.
+    """
+
+    name: str
+    scale: float = 1.0
+    logarithmic: bool = False
+    lower: float = -np.inf
+    upper: float = np.inf
+    prior: float = 0.0
+
+    def of(self, point: Point) -> float:
+        """The coordinate of a point."""
+        value = value_of(point, self.name)
+        return float(np.log(value)) if self.logarithmic else value / self.scale
+
+    def value(self, x: float) -> float:
+        """The number (SI) at a coordinate, within its bounds."""
+        raw = np.exp(np.clip(x, -700.0, 700.0)) if self.logarithmic else x * self.scale
+        return float(np.clip(raw, self.lower, self.upper))
+
+    def within(self, x: float) -> float:
+        """The coordinate within its bounds."""
+        value = self.value(x)
+        return float(np.log(value)) if self.logarithmic else value / self.scale
+
+
+def value_of(point: Point, name: str) -> float:
+    """A number of a point by its coordinate's name."""
+    kind, _, number = name.partition(" ")
+    if number:
+        return (point.deviations if kind == "noise" else point.forces)[int(number)]
+    return getattr(point, name) if name in OTHERS else point.numbers[name]
+
+
+def with_values(point: Point, values: Mapping[str, float]) -> Point:
+    """A point with other numbers."""
+    deviations = tuple(values.get(f"noise {i}", old) for i, old in enumerate(point.deviations))
+    forces = tuple(values.get(f"force {i}", old) for i, old in enumerate(point.forces))
+    other = {name: values[name] for name in OTHERS if name in values}
+    own = {n: v for n, v in values.items() if n not in OTHERS and " " not in n}
+    return replace(
+        point, numbers={**point.numbers, **own}, deviations=deviations, forces=forces, **other
+    )
+
+
+@dataclass(frozen=True)
+class Fit:
+    """The greatest likelihood from one start.
+
+    Attributes:
+        point: where it is.
+        value: its log likelihood, less the penalty of priors.
+        coordinates: what was free.
+        tied: slots that follow another slot.
+        information: expected information, shape (p, p), in the coordinates' units.
+        scores: of each block of readings, shape (blocks, p).
+    """
+
+    point: Point
+    value: float
+    coordinates: tuple[Coordinate, ...]
+    tied: Mapping[str, str]
+    information: Array
+    scores: Array
+
+    @cached_property
+    def deviations(self) -> dict[str, float]:
+        """Standard errors (SI) by name, by the sandwich of information and scores."""
+        bread = np.linalg.pinv(self.information)
+        meat = self.scores.T @ self.scores
+        wide = np.maximum(np.diag(bread @ meat @ bread), np.diag(bread))
+        errors = np.sqrt(np.maximum(wide, 0.0))
+        sizes = [
+            value_of(self.point, c.name) if c.logarithmic else c.scale for c in self.coordinates
+        ]
+        return {
+            c.name: float(e * abs(s))
+            for c, e, s in zip(self.coordinates, errors, sizes, strict=True)
+        }
+
+    def moved(self, name: str, x: float) -> Point:
+        """The point with one coordinate elsewhere."""
+        coordinate = next(c for c in self.coordinates if c.name == name)
+        return with_values(self.point, with_tied({name: coordinate.value(x)}, self.tied))
+
+
+def with_tied(values: Mapping[str, float], tied: Mapping[str, str]) -> dict[str, float]:
+    """Values with those of the slots that follow them."""
+    return {**values, **{slot: values[of] for slot, of in tied.items() if of in values}}
+
+
+def fit(
+    box: GreyBox, start: Point, coordinates: Sequence[Coordinate], tied: Mapping[str, str]
+) -> Fit:
+    """Greatest likelihood from a start.
+
+    Args:
+        box: the filter.
+        start: where to begin, and the middle of the priors.
+        coordinates: what is free.
+        tied: slots that follow another slot.
+    """
+    origin = np.array([c.of(start) for c in coordinates])
+    weight = np.array([1.0 / c.prior**2 if c.prior else 0.0 for c in coordinates])
+
+    def point(x: Array) -> Point:
+        values = {c.name: c.value(v) for c, v in zip(coordinates, x, strict=True)}
+        return with_values(start, with_tied(values, tied))
+
+    def within(x: Array) -> Array:
+        return np.array([c.within(v) for c, v in zip(coordinates, x, strict=True)])
+
+    def valued(xs: Sequence[Array]) -> tuple[Array, list[tuple[Array, Array]]]:
+        results = box.innovations([point(x) for x in xs])
+        penalty = 0.5 * np.array([weight @ (x - origin) ** 2 for x in xs])
+        return log_likelihood(results, box.rows) - penalty, results
+
+    x, damping, p = within(origin), 1e-3, len(coordinates)
+    best = float(valued([x])[0][0])
+    information, scores = np.eye(p), np.zeros((BLOCKS, p))
+    for _ in range(MOST_ITERATIONS):
+        signs = np.where(within(x + STEP) > x, STEP, -STEP)
+        _, results = valued([x, *(x + np.diag(signs))])
+        information, scores = _scored(box, results, signs)
+        gradient = scores.sum(axis=0) - weight * (x - origin)
+        information += np.diag(weight)
+        scale = np.sqrt(np.maximum(np.diag(information), 1e-12))
+        normal = information / np.outer(scale, scale)
+        steps = []
+        for factor in FACTORS:
+            ridge = (damping * factor + 1e-10) * np.eye(p)
+            step = np.linalg.solve(normal + ridge, gradient / scale) / scale
+            steps.append(within(x + step * min(1.0, WIDEST / max(np.abs(step).max(), 1e-12))))
+        values, _ = valued(steps)
+        at = int(np.argmax(values))
+        gain = float(values[at]) - best
+        if not gain > 0.0:
+            break
+        x, best = steps[at], float(values[at])
+        damping = float(np.clip(damping * 10.0 ** (at - 2), 1e-6, 1e3))
+        if gain < LEAST_GAIN:
+            break
+    return Fit(point(x), best, tuple(coordinates), dict(tied), information, scores)
+
+
+def _scored(
+    box: GreyBox, results: Sequence[tuple[Array, Array]], signs: Array
+) -> tuple[Array, Array]:
+    """Expected information (p, p) and scores of blocks (blocks, p) from runs at and beside a point."""
+    slopes, sizes = [], []
+    with np.errstate(all="ignore"):
+        for (errors, spreads), trial in zip(results, box.rows, strict=True):
+            mask = trial.there.ravel()
+            e, s = (a.reshape(len(a), -1)[:, mask] for a in (errors, spreads))
+            root = np.sqrt(s[0])
+            de = (e[1:] - e[0]) / (signs[:, None] * root)
+            ds = (np.log(s[1:]) - np.log(s[0])) / signs[:, None]
+            bad = ~(np.isfinite(de) & np.isfinite(ds))
+            slopes.append(np.where(bad, 0.0, np.stack([de, ds])))
+            white = e[0] / root
+            sizes.append(np.stack([white, 1.0 - white**2]))
+    (de, ds), (white, short) = np.concatenate(slopes, axis=2), np.concatenate(sizes, axis=1)
+    scores = -(de * white + 0.5 * ds * short)
+    edges = np.linspace(0, scores.shape[1], BLOCKS + 1).astype(int)[:-1]
+    return de @ de.T + 0.5 * ds @ ds.T, np.add.reduceat(scores, edges, axis=1).T

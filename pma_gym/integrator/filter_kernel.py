@@ -1,0 +1,380 @@
+"""Compiled extended Kalman filter of a rig: innovations row by row, one parameter vector per lane.
+
+Between two rows mean and covariance move together in short steps of the Rosenbrock method ROS2 (order 2, L-stable), whose
+transition matrix is the exact derivative of the linearised step:
+
+    (I - g h J) k1 = h f(x),   (I - g h J) k2 = h f(x + k1) - 2 k1,   x+ = x + 3/2 k1 + 1/2 k2,   g = 1 - 1/sqrt(2)
+
+Dry friction is the bristle of the catalogue: while it sticks it is a stiff spring, which takes the variance of the speed away by
+itself. At a row the readings correct mean and covariance one after the other.
+
+Source:
+    J. G. Verwer, E. J. Spee, J. G. Blom, W. Hundsdorfer 1999, "A second-order Rosenbrock method applied to photochemical dispersion
+    problems", SIAM J. Sci. Comput. 20; A. H. Jazwinski 1970, "Stochastic Processes and Filtering Theory", for the filter.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+from llvmlite import ir
+
+from pma_gym.codegen.derivative import derivatives
+from pma_gym.codegen.graph import CHANGING, FIXED, HELD, Value
+from pma_gym.codegen.machine.control import (
+    INTEGER,
+    POINTER,
+    Builder,
+    Module,
+    Operand,
+    function,
+    integer,
+    loop,
+    offset,
+)
+from pma_gym.codegen.machine.simd import SimdEmitter
+from pma_gym.codegen.trace import live_inputs, split, substitute, trace
+from pma_gym.effects.arithmetic import clip
+from pma_gym.integrator.equations import COMMANDS, Equations
+from pma_gym.integrator.exponential_rosenbrock import solver
+from pma_gym.integrator.integration import memory
+from pma_gym.integrator.step_attempt import _signs, step_start
+
+FULL = 0.9999
+"""Largest deflection of bristles that a correction leaves: at 1 the law of their way has no slope."""
+
+POLE = 1.0 - 0.5**0.5
+
+Entry = Value | None
+
+
+@dataclass
+class FilterEquations:
+    """The arithmetic of one step and of one correction.
+
+    Args:
+        eq: the rig's equations, the latent force among its effects.
+        noisy: name of the state that process noise drives.
+        readings: the value that each sensor reads.
+        bristles: names of memories that are deflections of bristles, between -1 and 1.
+    """
+
+    eq: Equations
+    noisy: str
+    readings: Sequence[Value]
+    bristles: Sequence[str] = ()
+    step: list[Value] = field(init=False)
+    transition: list[list[Entry]] = field(init=False)
+    correction: list[Value] = field(init=False)
+
+    def __post_init__(self) -> None:
+        eq, graph = self.eq, self.eq.graph
+        self.states = [*eq.states, *eq.rate_independent_states]
+        self.mean = [state.value for state in self.states]
+        n = len(self.mean)
+        self.covariance = {
+            (i, j): graph.input(f"covariance {i} {j}", CHANGING)
+            for i in range(n)
+            for j in range(i + 1)
+        }
+        self.length = graph.input("substep", CHANGING)
+        self.drive = graph.input("process_noise", FIXED)
+        self.variances = [graph.input(f"variance {i}", FIXED) for i in range(len(self.readings))]
+        self.read = [graph.input(f"reading {i}", CHANGING) for i in range(len(self.readings))]
+        self.counts = [graph.input(f"counts {i}", CHANGING) for i in range(len(self.readings))]
+        self.moved, self.transition = self._moved()
+        self.step = [*self.moved, *self._spread()]
+        self.correction = self._corrected()
+
+    def p(self, i: int, j: int) -> Value:
+        """Entry of the covariance."""
+        return self.covariance[max(i, j), min(i, j)]
+
+    def _moved(self) -> tuple[list[Value], list[list[Entry]]]:
+        eq, h = self.eq, self.length
+        frozen, here = step_start(eq)
+        frozen = {**frozen, **_signs(eq, frozen)}
+        own, memories = eq.states, eq.rate_independent_states
+        rates = [state.rate for state in own]
+        origin = [eq["origin"]] if memories else []
+        wrt = [*self.mean, *origin]
+        bounded = {
+            state.value.id: trace(clip, state.value, -FULL, FULL)
+            for state in memories
+            if state.name in self.bristles
+        }
+        frozen, here = (
+            {**frozen, **bounded},
+            {**here, **{m.after.id: bounded.get(m.value.id, m.value) for m in memories}},
+        )
+        start = {**frozen, **here}
+        slopes = [
+            [None if s is None else substitute([s], start)[0] for s in row]
+            for row in derivatives(rates, wrt)
+        ]
+        n = len(own)
+        jacobian = [row[:n] for row in slopes]
+        solve = solver(jacobian, POLE * h)
+        first = solve([h * rate for rate in substitute(rates, start)])
+        ends = {**frozen, **{s.value.id: s.value + k for s, k in zip(own, first, strict=True)}}
+        bent = substitute(rates, ends)
+        second = solve([h * rate - 2.0 * k for rate, k in zip(bent, first, strict=True)])
+        moved = [s.value + 1.5 * a + 0.5 * b for s, a, b in zip(own, first, second, strict=True)]
+        columns = []
+        for j in range(len(self.mean)):
+            unit: list[Entry] = [None] * len(wrt)
+            unit[j] = eq.graph.constant(1.0)
+            if origin and eq.travelled is not None and self.mean[j] is eq.travelled[0]:
+                unit[-1] = eq.graph.constant(1.0)
+            columns.append(self._column(slopes, solve, unit, n))
+        transition: list[list[Entry]] = [[column[i] for column in columns] for i in range(n)]
+        after = {**frozen, **{s.value.id: new for s, new in zip(own, moved, strict=True)}}
+        if memories:
+            moved += substitute([m.after for m in memories], after)
+            for row in derivatives([m.after for m in memories], wrt):
+                known = [None if s is None else substitute([s], after)[0] for s in row]
+                out: list[Entry] = []
+                for j in range(len(self.mean)):
+                    total: Entry = None
+                    for i in range(n):
+                        total = _plus(total, _times(known[i], columns[j][i]))
+                    if j >= n:
+                        total = _plus(total, known[j])
+                    if eq.travelled is not None and self.mean[j] is eq.travelled[0]:
+                        total = _plus(total, known[-1])
+                    out.append(total)
+                transition.append(out)
+        return moved, transition
+
+    def _column(
+        self,
+        slopes: Sequence[Sequence[Entry]],
+        solve: Callable[[Sequence[Entry]], list[Value]],
+        unit: list[Entry],
+        n: int,
+    ) -> list[Entry]:
+        """What one unit of a state becomes of all states in the linearised step."""
+        h = self.length
+
+        def right(vector: list[Entry]) -> list[Entry]:
+            out: list[Entry] = []
+            for row in slopes:
+                total: Entry = None
+                for slope, part in zip(row, vector, strict=True):
+                    total = _plus(total, _times(slope, part))
+                out.append(_times(h, total))
+            return out
+
+        a = [None if _zero(k) else k for k in solve(right(unit))]
+        there = [_plus(u, k) for u, k in zip(unit, a, strict=False)] + unit[n:]
+        rhs = [
+            _plus(r, _times(self.eq.graph.constant(-2.0), k))
+            for r, k in zip(right(there), a, strict=True)
+        ]
+        b = [None if _zero(k) else k for k in solve(rhs)]
+        half = self.eq.graph.constant
+        return [
+            _plus(u, _plus(_times(half(1.5), x), _times(half(0.5), y)))
+            for u, x, y in zip(unit, a, b, strict=False)
+        ]
+
+    def _spread(self) -> list[Value]:
+        """Covariance after the step, row by row of its lower half."""
+        n, zero = len(self.mean), self.eq.graph.constant(0.0)
+        half = []
+        for row in self.transition:
+            across: list[Entry] = []
+            for j in range(n):
+                total: Entry = None
+                for k in range(n):
+                    total = _plus(total, _times(row[k], self.p(k, j)))
+                across.append(total)
+            half.append(across)
+        out = []
+        for i, j in self.covariance:
+            total: Entry = None
+            for k in range(n):
+                total = _plus(total, _times(half[i][k], self.transition[j][k]))
+            if i == j and self.states[i].name == self.noisy:
+                total = _plus(total, self.drive * self.length)
+            out.append(zero if total is None else total)
+        return out
+
+    def _corrected(self) -> list[Value]:
+        """Mean and covariance after the readings, then each reading's innovation and variance."""
+        eq, n = self.eq, len(self.mean)
+        zero = eq.graph.constant(0.0)
+        here = {m.after.id: m.value for m in eq.rate_independent_states}
+        mean = list(self.mean)
+        p = {(i, j): self.p(i, j) for i in range(n) for j in range(n)}
+        shown: list[Value] = []
+        rows = derivatives(list(self.readings), self.mean)
+        for value, row, reading, counts, variance in zip(
+            self.readings, rows, self.read, self.counts, self.variances, strict=True
+        ):
+            (expected,) = substitute([value], here)
+            # Linear in the change of the mean that former readings of the same row have made.
+            for slope, new, old in zip(row, mean, self.mean, strict=True):
+                if slope is not None and new is not old:
+                    expected = expected + substitute([slope], here)[0] * (new - old)
+            slopes = [None if s is None else substitute([s], here)[0] for s in row]
+            along: list[Entry] = []
+            for i in range(n):
+                total: Entry = None
+                for k in range(n):
+                    total = _plus(total, _times(slopes[k], p[i, k]))
+                along.append(total)
+            spread: Entry = variance
+            for k in range(n):
+                spread = _plus(spread, _times(slopes[k], along[k]))
+            assert spread is not None
+            off = reading - expected
+            innovation = off * counts
+            share = counts / spread
+            gains = [None if a is None else a * share for a in along]
+            mean = [
+                m if g is None else m + g * innovation for m, g in zip(mean, gains, strict=True)
+            ]
+            before, p = p, {}
+            for i in range(n):
+                for j in range(i + 1):
+                    less = _plus(before[i, j], _minus(_times(gains[i], along[j])))
+                    p[i, j] = p[j, i] = zero if less is None else less
+            shown += [off, spread]
+        return [*mean, *(p[key] for key in self.covariance), *shown]
+
+
+def _zero(value: Entry) -> bool:
+    return value is None or (value.is_constant and value.data == 0.0)
+
+
+def _times(a: Entry, b: Entry) -> Entry:
+    return None if _zero(a) or _zero(b) else a * b
+
+
+def _plus(a: Entry, b: Entry) -> Entry:
+    if a is None or b is None:
+        return b if a is None else a
+    return a + b
+
+
+def _minus(a: Entry) -> Entry:
+    return None if a is None else -a
+
+
+ARGUMENTS = ("times", "commands", "readings", "parameters", "start", "out", "kept")
+"""Addresses that the function takes, after the numbers of rows and of steps a row.
+
+times: length of a step before each row, (rows,); commands: [row, step, lane]; readings: [row, sensor, (reading, counts)];
+parameters: [slot, lane]; start: [state and covariance, lane]; out: [row, sensor, (reading less what was expected, variance), lane]; kept: per row
+the predicted mean and covariance, the corrected ones and the transition from the row before, one lane.
+"""
+
+
+def _everything(made: FilterEquations, keeps: bool) -> list[Value]:
+    transition = [
+        entry for row in made.transition for entry in row if entry is not None and not _zero(entry)
+    ]
+    return [*made.step, *made.correction, *(transition if keeps else ())]
+
+
+def _fixed_inputs(values: Sequence[Value]) -> list[Value]:
+    return [value for value in live_inputs(values) if value.level == FIXED]
+
+
+def parameter_slots(made: FilterEquations, keeps: bool) -> list[str]:
+    """Names of the parameters that the compiled filter takes, in their order."""
+    return [str(value.data) for value in _fixed_inputs(_everything(made, keeps))]
+
+
+def write_filter(module: Module, made: FilterEquations, width: int, keeps: bool) -> None:
+    """Write the function `innovations`; `keeps` for one lane that keeps what a smoother needs."""
+    eq, n = made.eq, len(made.mean)
+    simd = SimdEmitter(width, fused=True)
+    b, (rows, steps, *pointers) = function(
+        module,
+        "innovations",
+        [("rows", INTEGER), ("steps", INTEGER), *((name, POINTER) for name in ARGUMENTS)],
+    )
+    times, commands, readings, parameters, start, out, kept = pointers
+    everything = _everything(made, keeps)
+    transition = everything[len(made.step) + len(made.correction) :]
+    fixed, inputs = split(everything, FIXED), _fixed_inputs(everything)
+    loaded = {value.id: simd.load(b, parameters, i) for i, value in enumerate(inputs)}
+    known_fixed = simd.emit(b, fixed, loaded)
+    size = n + len(made.covariance)
+    state = memory(b, ir.ArrayType(simd.real, size))
+    cells = [*made.mean, *made.covariance.values()]
+    held = {
+        value.id: simd.constant(0.0)
+        for value in live_inputs(everything)
+        if value.level == HELD and value.data not in COMMANDS
+    }
+    held[eq[COMMANDS[1]].id] = simd.constant(0.0)
+    phi = memory(b, ir.ArrayType(simd.real, 2 * n * n))
+    slot = 2 * size + n * n
+
+    def load() -> dict[int, Operand]:
+        return {
+            **known_fixed,
+            **held,
+            **{v.id: simd.load(b, state, i) for i, v in enumerate(cells)},
+        }
+
+    for i in range(size):
+        simd.store(b, simd.load(b, start, i), state, i)
+    with loop(b, rows) as row:
+        if keeps:
+            for i in range(n * n):
+                simd.store(b, simd.constant(float(i % (n + 1) == 0)), phi, i)
+        moves = b.select(b.icmp_signed(">", row, integer(0)), steps, integer(0))
+        length = simd.spread(b, b.load(offset(b, times, row), typ=simd.element))
+        with loop(b, moves) as s:
+            known = load()
+            known[made.length.id] = length
+            known[eq[COMMANDS[0]].id] = simd.load(b, commands, b.add(b.mul(row, steps), s))
+            emitted = simd.emit(b, [*made.step, *transition], known)
+            for i, value in enumerate(made.step):
+                simd.store(b, emitted[value.id], state, i)
+            if keeps:
+                _chain(b, simd, made, emitted, phi)
+        base = b.mul(row, integer(slot))
+        if keeps:
+            for i in range(size):
+                simd.store(b, simd.load(b, state, i), kept, b.add(base, integer(i)))
+            for i in range(n * n):
+                simd.store(b, simd.load(b, phi, i), kept, b.add(base, integer(2 * size + i)))
+        known = load()
+        m = len(made.readings)
+        for i in range(m):
+            where = b.mul(b.add(b.mul(row, integer(m)), integer(i)), integer(2))
+            for at, value in enumerate((made.read[i], made.counts[i])):
+                number = b.load(offset(b, readings, b.add(where, integer(at))), typ=simd.element)
+                known[value.id] = simd.spread(b, number)
+        emitted = simd.emit(b, made.correction, known)
+        for i, value in enumerate(made.correction[:size]):
+            simd.store(b, emitted[value.id], state, i)
+        for i, value in enumerate(made.correction[size:]):
+            simd.store(b, emitted[value.id], out, b.add(b.mul(row, integer(2 * m)), integer(i)))
+        if keeps:
+            for i in range(size):
+                simd.store(b, simd.load(b, state, i), kept, b.add(base, integer(size + i)))
+    b.ret_void()
+
+
+def _chain(
+    b: Builder, simd: SimdEmitter, made: FilterEquations, emitted: dict, phi: Operand
+) -> None:
+    """Multiply the transition since the last row by that of one more step."""
+    n = len(made.mean)
+    before = [simd.load(b, phi, i) for i in range(n * n)]
+    for i in range(n):
+        for j in range(n):
+            total = None
+            for k in range(n):
+                entry = made.transition[i][k]
+                if _zero(entry):
+                    continue
+                assert entry is not None
+                part = b.fmul(emitted[entry.id], before[k * n + j])
+                total = part if total is None else b.fadd(total, part)
+            simd.store(b, simd.constant(0.0) if total is None else total, phi, i * n + j)
