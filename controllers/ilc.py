@@ -242,8 +242,7 @@ class ILC:
         plant = LiftedModel(motion, late, count)
         errors = np.array(self._errors[late:])
         without = errors + plant.response(np.array(self._added[:count]))
-        taut = tight(self._taut[late:])
-        change = plant.change(without, taut, self.settings.cutoff)
+        change = plant.change(without, tight(self._taut[late:]), self.settings.cutoff)
         smooth = 2.0 * self.settings.cutoff * station.period
         power = float(np.mean(plant.response(change) ** 2)) / (smooth * motion.noise**2)
         # The voltages are kept by the period that they are in force in.

@@ -86,8 +86,7 @@ class Choice:
         return self._devices(model, SEARCHED)
 
     def _devices(self, model: Model, common: dict) -> list[Device]:
-        own = RADIUS.from_si(own_device(model).radius)
-        defaults = {**common, "radius": (own,)}
+        defaults = {**common, "radius": (RADIUS.from_si(own_device(model).radius),)}
         options = [
             numbers(name, getattr(self, name)) or default for name, default in defaults.items()
         ]

@@ -269,10 +269,8 @@ class Triangle:
 
     def contraction(self, model: Model) -> np.ndarray:
         """Simulate the contraction in the last period (m), shape (n,)."""
-        count = round(CYCLES * self.period_s * RATE_HZ)
-        time = np.arange(count + 1) / RATE_HZ
-        phase = np.mod(time / self.period_s, 1.0)
-        share = 1.0 - np.abs(2.0 * phase - 1.0)
+        time = np.arange(round(CYCLES * self.period_s * RATE_HZ) + 1) / RATE_HZ
+        share = 1.0 - np.abs(2.0 * np.mod(time / self.period_s, 1.0) - 1.0)
         pressure = self.low_kpa + (self.high_kpa - self.low_kpa) * share
         trial = Trial(
             time,

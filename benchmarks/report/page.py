@@ -135,8 +135,7 @@ def _opening(leaderboard: Leaderboard) -> list[Block]:
         "Every trial is scored on the true motion at 384 Hz."
     )
     blocks: list[Block] = [Heading(f"Leaderboard: {suite.name}", 1), Paragraph(text)]
-    notes = _notes(leaderboard)
-    return blocks + [Paragraph(note) for note in notes]
+    return blocks + [Paragraph(note) for note in _notes(leaderboard)]
 
 
 def incomplete_counts(leaderboard: Leaderboard) -> str:
@@ -235,8 +234,7 @@ def _spending_blocks(leaderboard: Leaderboard) -> list[Block]:
     for each in shown_standings(leaderboard):
         measure = each.errors.measure
         if not (measure.returning or measure.alone):
-            names = [row.name for row in each.rows]
-            rows = spending(leaderboard.record, measure, names)
+            rows = spending(leaderboard.record, measure, [row.name for row in each.rows])
             name = measure.tasks[0].replace("_", " ")
             title = f"{capital(name)}: whole trials"
             if len(measure.tasks) > 1:

@@ -95,8 +95,7 @@ def replay_plot(results: Results) -> Plot:
             axes[-1, column].set_xlabel("pressure (kPa)")
         figure.align_ylabels()
         mean = Line2D([], [], color=_GREY, linestyle=(0, (4, 2)), label="mean over the trials")
-        bars = Patch(color=color, label="simulated less measured")
-        legend_below(figure, [bars, mean], 2)
+        legend_below(figure, [Patch(color=color, label="simulated less measured"), mean], 2)
         return figure
 
 

@@ -60,8 +60,7 @@ def replay_errors(results: Results, model: str, task: str, phase: str) -> list[R
     """Errors of the replay on a model, trial by trial; failed cases are left out."""
     errors = []
     for pressure in results.suite.pressures_kpa.get(task, ()):
-        replay = results.suite.goals.replay
-        simulated = results.phase(model, replay, task, pressure, phase)
+        simulated = results.phase(model, results.suite.goals.replay, task, pressure, phase)
         if simulated is not None:
             measured = measured_score(task, phase, pressure)
             errors.append(ReplayError(task, phase, pressure, *_difference(simulated, measured)))

@@ -121,8 +121,7 @@ def probe(spec: ControllerSpec) -> str:
     Raises:
         ControllerError: it cannot be made.
     """
-    made = spec.make()
-    name = getattr(made, "name", "")
+    name = getattr(spec.make(), "name", "")
     return name.strip() if isinstance(name, str) else ""
 
 

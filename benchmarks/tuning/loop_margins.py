@@ -262,13 +262,11 @@ class Loop:
         systems = [sampled(place, station) for place in places]
         self.shares = [place.share for place in places]
         self.plants = [tuple(map(np.asarray, (s.A, s.B, s.C))) for s in systems]
-        corners = np.linspace(0.0, math.pi, 301)[1:]
-        self.z = np.exp(1j * corners)
+        self.z = np.exp(1j * np.linspace(0.0, math.pi, 301)[1:])
         self.responses = [self._response(*plant) for plant in self.plants]
 
     def _response(self, a: np.ndarray, b: np.ndarray, c: np.ndarray) -> np.ndarray:
-        inverse = np.linalg.inv(self.z[:, None, None] * np.eye(len(a)) - a)
-        return (c @ inverse @ b)[:, 0, 0]
+        return (c @ np.linalg.inv(self.z[:, None, None] * np.eye(len(a)) - a) @ b)[:, 0, 0]
 
     def sensitivity(self, gains: Gains) -> float:
         """Largest sensitivity |1 / (1 + C G)| over all places; infinite if one is unstable."""

@@ -63,5 +63,4 @@ def nearest_pressure(station: StationInfo, exercise: "Exercise") -> float:
     moments = Resistance(station).moments
     fine = np.arange(PRESSURES[0], PRESSURES[-1], 1e3)
     available = np.array([np.interp(fine, PRESSURES, column) for column in moments.T])
-    missed = np.mean((available - prescribed[:, None]) ** 2, axis=0)
-    return float(fine[np.argmin(missed)])
+    return float(fine[np.argmin(np.mean((available - prescribed[:, None]) ** 2, axis=0))])

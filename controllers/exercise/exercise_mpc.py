@@ -163,8 +163,7 @@ class ExerciseMPC:
         still = pressure - self._regulator.offset
         program = self._programmed(local.stiffness, pressure)
         past = local.influence * (np.array(self._sent) - still)
-        errors = self._errors(program, past, moment, now)
-        linear = program.pull @ errors
+        linear = program.pull @ self._errors(program, past, moment, now)
         linear[0] -= self.settings.effort * local.influence * (self._chosen - still)
         low, high = (local.influence * (limit - still) for limit in self._limits)
         size = np.ones(len(linear))

@@ -256,8 +256,7 @@ def programmed(joint: Joint, of_moment: bool, effort: float, horizon: Horizon) -
     pull = effect.T / horizon.ahead
     changes = np.eye(len(edges) - 1) - np.eye(len(edges) - 1, k=-1)
     square = pull @ effect + effort * changes.T @ changes
-    strides = horizon.stride * np.arange(horizon.ahead)
-    drift = np.add.reduceat(drift, strides, axis=2)
+    drift = np.add.reduceat(drift, horizon.stride * np.arange(horizon.ahead), axis=2)
     return Program(square, pull, state, drift, command[:, :, : horizon.late].copy())
 
 

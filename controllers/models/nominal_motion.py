@@ -288,8 +288,7 @@ def nominal_motion(reference: Reference, station: StationInfo) -> NominalMotion:
     step, first = station.period / parts, round(parts * station.action_delay / station.period)
     planned = delayed_start(_sampled(reference, station, parts), first)
     if len(jumps(planned, span)):
-        stroke = stroke_along(planned, station)
-        planned = without_jumps(planned, first, step, stroke, span)
+        planned = without_jumps(planned, first, step, stroke_along(planned, station), span)
     volts = _voltages(inverse, _Aim(planned, station))
     return NominalMotion(reference, station, planned, volts)
 

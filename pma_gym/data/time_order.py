@@ -120,8 +120,7 @@ def _fix_backward(time: Array, back: NDArray[np.intp], place: Place) -> str:
             f"from {where} on, rows have times of rows before them: remove one copy where both "
             "hold the same readings"
         )
-    starts = np.concatenate([[0], back[:-1]])
-    elapsed = time[back - 1] - time[starts]
+    elapsed = time[back - 1] - time[np.concatenate([[0], back[:-1]])]
     if np.all(missing > 0.5 * elapsed):
         return f"the clock begins again, a new trial: {split}"
     return f"the clock was set back: {add}" + (

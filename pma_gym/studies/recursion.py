@@ -64,8 +64,7 @@ def compare_recursion() -> list[Comparison]:
 def _compare_formulas() -> list[Comparison]:
     """Eq. 25 is Tustin's method; Appendix C is not, and is unstable."""
     rate = profile_model(300).muscle_rate
-    transfer = cascade_transfer(rate, MOTOR_RATE)
-    right = tustin_recursion(transfer, SAMPLE_TIME)
+    right = tustin_recursion(cascade_transfer(rate, MOTOR_RATE), SAMPLE_TIME)
     rows: list[Comparison] = []
     for table, formula in (("Eq. 25", closed_form_recursion), ("Appendix C", appendix_c_recursion)):
         printed = formula(rate, MOTOR_RATE, SAMPLE_TIME)

@@ -256,6 +256,5 @@ def voltage_profile(task: str, pressure_kpa: float) -> VoltageProfile:
     """
     pressures(task)  # says which tasks there are
     times, positions = _REFERENCES[task]
-    samples = round(times[-1] / SAMPLE_TIME) + 1
-    time = SAMPLE_TIME * np.arange(samples)
+    time = SAMPLE_TIME * np.arange(round(times[-1] / SAMPLE_TIME) + 1)
     return feedforward(np.interp(time, times, positions), pressure_kpa)

@@ -136,8 +136,7 @@ def _reversals(g: Generator, time: Array, deepest: float) -> tuple[Array, Array]
     low, high = loads_at(pressure, deepest)
     middle, half = 0.5 * (low + high), 0.5 * (high - low)
     shares = np.linspace(1.0, 0.15, g.integers(5, 10)) * g.uniform(0.8, 1.0)
-    signs = np.resize([-1.0, 1.0], len(shares))
-    levels = np.r_[middle, middle + half * shares * signs]
+    levels = np.r_[middle, middle + half * shares * np.resize([-1.0, 1.0], len(shares))]
     return np.full(time.shape, pressure), _zigzag(time, levels, g.uniform(150, 800))
 
 

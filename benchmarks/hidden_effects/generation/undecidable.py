@@ -240,8 +240,7 @@ def _rivals(
         if name not in group(effect)
     }
     variants = [(numbers, {name: values}) for name, values in rivals.items()]
-    readings = simulate_variants(experiment.commands, variants)
-    return dict(zip(rivals, readings, strict=True))
+    return dict(zip(rivals, simulate_variants(experiment.commands, variants), strict=True))
 
 
 BLOCKS: dict[str, Block] = USUAL | {

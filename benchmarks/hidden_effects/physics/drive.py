@@ -37,8 +37,7 @@ class NarrowValve(Hidden):
         """The rate, held."""
         ratio = (moment.pressure + ATMOSPHERE) / (SUPPLY + ATMOSPHERE)
         beyond = np.clip((ratio - CRITICAL) / (1.0 - CRITICAL), 0.0, 1.0)
-        filling = self.limit * np.sqrt(1.0 - beyond * beyond)
-        return np.clip(rate, -self.limit, filling)
+        return np.clip(rate, -self.limit, self.limit * np.sqrt(1.0 - beyond * beyond))
 
 
 class LateValve(Hidden):
@@ -62,8 +61,7 @@ class LazyValve(Hidden):
 
     def flow(self, rate: Array, moment: Moment) -> Array:
         """The rate of what is wrong beyond the width."""
-        error = moment.asked - moment.pressure
-        size = np.abs(error)
+        size = np.abs(moment.asked - moment.pressure)
         return rate * np.maximum(size - self.width, 0.0) / np.maximum(size, 1e-6)
 
 

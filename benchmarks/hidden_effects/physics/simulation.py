@@ -68,8 +68,7 @@ def simulate(commands: Commands, rig: Numbers, hidden: Sequence[Hidden] = ()) ->
         middles = (np.arange(count, dtype=np.float64) + first * SUBSTEPS + 0.5) * step
         loads = _loads(commands, rig, hidden, middles, step)
         asked = _pressures(commands, rig, hidden, middles, step)
-        signals = _integrate(moment, hidden, loads, asked)
-        filtered = sensors.follow(signals, step)
+        filtered = sensors.follow(_integrate(moment, hidden, loads, asked), step)
         for i, signal in enumerate(filtered):
             kept = signal[SUBSTEPS - 1 :: SUBSTEPS].T
             readings[:, first + 1 : first + 1 + kept.shape[1], i] = kept

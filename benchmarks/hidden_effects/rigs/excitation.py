@@ -39,8 +39,7 @@ def draw_lengths(rng: np.random.Generator, rate: float, frequency: float) -> lis
     """Seconds of each file: three to six files of 5 s to 5 min, eight periods at least."""
     files = int(rng.integers(3, 7))
     least = max(SHORTEST, 8.0 / frequency)
-    most = min(LONGEST, max(least, ROWS / rate / files))
-    usual = log_uniform(rng, least, most)
+    usual = log_uniform(rng, least, min(LONGEST, max(least, ROWS / rate / files)))
     return [round(usual * rng.uniform(0.8, 1.0) + 0.2 * least, 1) for _ in range(files)]
 
 
@@ -59,8 +58,7 @@ def draw_reference(
     shape = SHAPES[int(rng.integers(len(SHAPES)))]
     rest = REST * rng.uniform(1.0, 2.0)
     time = np.arange(rows) / rate - rest
-    moving = shape(rng, frequency, np.maximum(time, 0.0))
-    q = travel * moving * _smooth(time * frequency)
+    q = travel * shape(rng, frequency, np.maximum(time, 0.0)) * _smooth(time * frequency)
     v = np.gradient(q) * rate
     return Reference(q, v, np.gradient(v) * rate)
 

@@ -101,8 +101,7 @@ def _drawn(
     omega = 2.0 * math.pi * frequency
     damping = inertia * omega * log_uniform(rng, 0.1, 1.5)
     stiffness = inertia * (omega * rng.uniform(0.7, 2.5)) ** 2 if spring else 0.0
-    rates = [rate for rate in RATES if rate >= 30.0 * frequency]
-    rate = float(rng.choice(rates))
+    rate = float(rng.choice([rate for rate in RATES if rate >= 30.0 * frequency]))
     # A whole number of milliradians: it is written into a file.
     angle = round(rng.uniform(-0.3, 0.3), 3) if gravity else 0.0
     return Rig(kind, inertia, damping, stiffness, gravity, angle, travel, frequency, rate)

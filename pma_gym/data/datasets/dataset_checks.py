@@ -115,8 +115,7 @@ def _largest(values: Array | None) -> float:
         return 0.0
     sizes = np.sort(np.abs(values[np.isfinite(values)]))
     # Of few readings all but the largest are the bulk.
-    last = min(int(np.ceil(_BULK * sizes.size)), max(sizes.size - 1, 1))
-    return float(sizes[last - 1])
+    return float(sizes[min(int(np.ceil(_BULK * sizes.size)), max(sizes.size - 1, 1)) - 1])
 
 
 def _moved(file_key: dict[str, Array], quantity: str) -> str:

@@ -44,8 +44,7 @@ def known_suffix(path: Path) -> str:
 def split_part(path: str | os.PathLike[str]) -> tuple[Path, str]:
     """A file, and the part of it that a name like `march.xlsx#run2` means; "" for all of it."""
     whole = as_path(path, TrialError)
-    text = os.fspath(path)
-    name, mark, part = text.partition(PART)
+    name, mark, part = os.fspath(path).partition(PART)
     while mark:
         if Path(name).suffix.lower() in DECODERS and Path(name).is_file() and not whole.is_file():
             return Path(name), part

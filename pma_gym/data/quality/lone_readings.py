@@ -234,8 +234,7 @@ def outliers(values: Values, place: Callable[[int], str]) -> Iterator[str]:
             continue
         readings = all_values[finite]
         low, high = np.quantile(readings, [_FEW, 1.0 - _FEW], method="nearest")
-        away = np.maximum(low - readings, readings - high)
-        at = finite[away > _FAR * (high - low)]
+        at = finite[np.maximum(low - readings, readings - high) > _FAR * (high - low)]
         if not at.size or high == low or at.size > max(1.0, _FEW * finite.size):
             continue
         # A short pulse is a signal; it lasts longer than a reading.

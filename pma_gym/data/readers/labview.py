@@ -53,8 +53,7 @@ def read_labview(text: str, file: str, request: Request) -> list[Table]:
     Raises:
         TrialError: no segment, or rows that are no table.
     """
-    lines = split_lines(text, file)
-    header, segments = _segments(lines, file, request)
+    header, segments = _segments(split_lines(text, file), file, request)
     request = _with_decimal(request, header)
     tables = [
         _table(segment, f"{file}#{number}" if len(segments) > 1 else file, request, number)
@@ -115,8 +114,7 @@ def _separator(header: Sequence[str], lines: Sequence[str]) -> str:
 
 def _header_start(cells: Sequence[Sequence[str]], ends: Sequence[int], n: int) -> int:
     """First line of the n-th header: `Channels` begins it, below the samples before."""
-    floor = ends[n - 1] + 1
-    lowest = max(floor, ends[n] - _LONGEST_HEADER)
+    lowest = max(ends[n - 1] + 1, ends[n] - _LONGEST_HEADER)
     for i in range(ends[n] - 1, lowest - 1, -1):
         if cells[i][0].lower() == "channels":
             return i
