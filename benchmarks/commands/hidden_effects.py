@@ -85,8 +85,8 @@ def hidden_effects_report(
 ) -> None:
     """Write the figures of several blocks of hidden effects as one page of tables."""
     from benchmarks.files import write_text
-    from benchmarks.hidden_effects.evaluation.summary import read_scores, report
-    from benchmarks.hidden_effects.run_blocks import JobError
+    from benchmarks.hidden_effects.evaluation.summary import report
+    from benchmarks.hidden_effects.run_blocks import JobError, read_scores
 
     try:
         text = report(read_scores(places), out.suffix if out else ".md")

@@ -3,12 +3,10 @@
 Plots of what was named, against the size of the effect.
 """
 
-import json
 import math
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import pairwise
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -22,10 +20,8 @@ from benchmarks.hidden_effects.evaluation.targets import (
     RATES,
     SIZE_ERROR,
     Target,
-    table,
 )
 from benchmarks.hidden_effects.evaluation.verdicts import Outcome, compare, judged, unanswered
-from pma_gym.documents import read_json
 from pma_gym.pages.figures import legend_below, picture, png
 
 Z = 1.959964
@@ -37,33 +33,6 @@ SIZES = (0.0, 0.25, 0.4, 0.7, 1.0, 1.5, 2.5, 100.0)
 
 LEAST_ROUNDS = 2
 """Rounds that a mean counts to, at least: one that ended before did not settle later."""
-
-
-def score(folder: Path) -> str:
-    """Tables of what `draw` and `judge` left in a folder; as JSON in `folder/score.json`."""
-    document = count(read(folder))
-    (folder / "score.json").write_text(json.dumps(document, indent=1) + "\n", "utf-8")
-    return table(document)
-
-
-def read(folder: Path) -> list[Outcome]:
-    """Outcomes of all cases that `draw` wrote to a folder."""
-    outcomes = []
-    for case in sorted((folder / "cases").glob("case_*")):
-        answer = folder / "answers" / case.name
-        truth = read_json(
-            folder / "truth" / f"{case.name}.json", "journal_mib", own=True, finite=False
-        )
-        if not (answer / "diagnosis.json").is_file():
-            outcomes.append(unanswered(truth, f"no {answer / 'diagnosis.json'}"))
-            continue
-        outcome = compare(
-            truth, read_json(answer / "diagnosis.json", "journal_mib", own=True, finite=False)
-        )
-        if (answer / "seconds.txt").is_file():
-            outcome.seconds = float((answer / "seconds.txt").read_text("utf-8"))
-        outcomes.append(outcome)
-    return outcomes
 
 
 def outcome_of(record: CaseRecord) -> Outcome:

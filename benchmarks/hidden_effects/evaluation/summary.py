@@ -1,14 +1,12 @@
 """`python -m benchmarks hidden-effects-report`: several blocks' figures as one document."""
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from benchmarks.hidden_effects.evaluation.records import Measured, measured_text
 from benchmarks.hidden_effects.evaluation.targets import instead, listed, percent
-from benchmarks.hidden_effects.run_blocks import SCORE, JobError, merged
-from pma_gym.document_shape import ListOf, ShapeError, check_shape
 from pma_gym.documents import read_json
 from pma_gym.pages.document import Block, Heading, Paragraph, TextTable, to_html, to_markdown
 
@@ -44,46 +42,6 @@ def _rate(rate: Mapping[str, Any]) -> str:
 
 MISSES = 40
 """How many misses of a block are listed; the rest are in its JSON."""
-
-
-_MEASURED = ListOf({"commit": str, "date": str, "method": str}, 1)
-_SCORE = {"seed": object, "blocks": {"*": {"measured": _MEASURED}}, "failures": ListOf(str)}
-"""Shape of the figures that the job writes."""
-
-
-def read_scores(places: Sequence[Path]) -> dict[str, Any]:
-    """Figures of folders that the job filled, or of its JSON files, as one document.
-
-    Raises:
-        JobError: nothing to read, no figures in it, or two sets of one block.
-    """
-    documents = []
-    for place in places:
-        path = place / SCORE if place.is_dir() else place
-        if not path.is_file():
-            raise JobError(
-                f"{path}: there is no such file; name a folder in which `python -m benchmarks "
-                "hidden-effects` ended, or its --json file"
-            )
-        try:
-            document = read_json(path, "journal_mib", own=True)
-        except ValueError as error:
-            raise JobError(
-                f"{path} is no JSON file ({error}); name one that the job wrote"
-            ) from None
-        try:
-            check_shape(document, _SCORE)
-        except ShapeError as error:
-            raise JobError(
-                f"{path} holds no figures of `python -m benchmarks hidden-effects` ({error}); run "
-                "it again, or name another"
-            ) from None
-        documents.append(document)
-    names = [name for document in documents for name in document["blocks"]]
-    for name in names:
-        if names.count(name) > 1:
-            raise JobError(f"block {name} is in {names.count(name)} of the files; name it once")
-    return merged(documents)
 
 
 def report(document: dict[str, Any], suffix: str = ".md") -> str:

@@ -23,8 +23,6 @@ from benchmarks.hidden_effects.physics import rig as rigs
 from benchmarks.hidden_effects.physics.rig import NOMINAL, SENSORS, UNITS, Array
 from benchmarks.hidden_effects.physics.simulation import RATE, Commands
 
-BLOCKS = ("single", "nothing", "parameters", "unknown", "pair")
-
 SCALED_TOGETHER = (
     ("force_slope",),
     ("force_intercept",),

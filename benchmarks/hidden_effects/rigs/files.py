@@ -155,7 +155,6 @@ velocity_mm_per_s = 0.0
 
 def _joint(rig: Rig, limit: float) -> str:
     """Of a joint under a torque, with a weight and a spring where the lab knows of them."""
-    del limit
     text = f"""schema = 1
 name = "lab"
 title = "What the lab believes"

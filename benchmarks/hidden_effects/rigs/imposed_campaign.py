@@ -72,7 +72,6 @@ class ImposedCampaign:
 
     def within_range(self, effects: Sequence[HiddenEffect]) -> "ImposedCampaign":
         """The same: the machine holds its motion against any force."""
-        del effects
         return self
 
     def tables(self, effects: Sequence[HiddenEffect]) -> list[files.Table]:
@@ -117,7 +116,6 @@ def draw_tested(
     rng: np.random.Generator, kind: str, simulator: str, seed: Sequence[int]
 ) -> ImposedCampaign:
     """A campaign with a seal, a brake or a spring."""
-    del kind
     count = int(rng.integers(3, 7))
     rig = draw_imposed(rng, count)
     lengths = draw_lengths(rng, rig.rate, rig.frequency)
