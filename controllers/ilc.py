@@ -30,9 +30,9 @@ from scipy.ndimage import binary_opening
 from scipy.sparse.linalg import spsolve
 
 from controllers.design.designs import designed, scheduled_gains
-from controllers.feedforward_pid import FeedforwardPID
 from controllers.models.nominal_motion import NominalMotion, nominal_motion
 from controllers.observers.extended_state_observer import LOOSE_N
+from controllers.pid import FeedforwardPID
 from controllers.registry import Reference
 from pma_gym.envs import Measurement, StationInfo
 

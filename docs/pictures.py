@@ -52,8 +52,7 @@ def first_controller_plot() -> bytes:
         for axis, label in zip(
             axes, ("extension (mm)", "error (mm)", "motor voltage (V)"), strict=True
         ):
-            axis.set_ylabel(label)
-            axis.set_xlabel("time (s)")
+            axis.set(ylabel=label, xlabel="time (s)")
         legend_below(figure, axes[0].get_lines(), 3)
         return png(figure)
 
@@ -77,8 +76,7 @@ def leaderboard_plot() -> bytes:
             axis.xaxis.set_major_locator(LogLocator(subs=subs, numticks=9))
             axis.xaxis.set_major_formatter("{x:g}")
             axis.xaxis.set_minor_formatter(NullFormatter())
-            axis.set_title(column)
-            axis.set_xlabel("RMSE")
+            axis.set(title=column, xlabel="RMSE")
         axes[0].set_yticks(places, names)
         return png(figure)
 

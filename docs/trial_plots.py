@@ -68,8 +68,7 @@ def controllers_plot() -> bytes:
         for axis, label in zip(
             axes, ("rotation (deg)", "error (deg)", "error, enlarged (deg)"), strict=True
         ):
-            axis.set_ylabel(label)
-            axis.set_xlabel("time (s)")
+            axis.set(ylabel=label, xlabel="time (s)")
         handles = [Line2D([], [], color=each.color, label=each.label) for each in styles.values()]
         legend_below(figure, [*handles, Line2D([], [], label="Ideal", **REFERENCE)], 4)  # type: ignore[arg-type]
         return _few_colours(png(figure))
@@ -164,8 +163,7 @@ def rig_plot() -> bytes:
             (curves, "The model simulates it", "contraction (mm)"),
             (residual, f"The diagnosis names {effect.name}", "measured less simulated (mm)"),
         ):
-            axis.set_title(title)
-            axis.set_ylabel(label)
+            axis.set(title=title, ylabel=label)
         for axis in axes:
             axis.set_xlabel("time (s)")
         handles = [

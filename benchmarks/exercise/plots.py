@@ -95,8 +95,9 @@ def _draw_angles(axis: Axes, model: Model, answer: Answer | None) -> None:
     if answer is not None:
         _draw_answer(axis, model, answer)
     axis.set(xlabel="angle (deg), 90 = straight leg", ylabel="moment (N m)", xlim=(0, 90))
-    axis.set_ylim(0.0, 1.4 * axis.get_ylim()[1])
-    axis.set_title("Over the angle, beside a young adult's knee")
+    axis.set(
+        ylim=(0.0, 1.4 * axis.get_ylim()[1]), title="Over the angle, beside a young adult's knee"
+    )
     axis.legend(loc="upper left", ncols=2, frameon=False, fontsize=8.5)
 
 

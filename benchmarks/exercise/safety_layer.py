@@ -71,8 +71,9 @@ def safety_table(safety: Safety) -> TextTable:
         "Layer | unsafe",
         "Layer | N m",
         "Layer | deg/s",
+        "None | episodes",
+        "None | unsafe",
     ]
-    header += ["None | episodes", "None | unsafe"]
     bare = {(t.task, t.stations, t.agent): t for t in safety.tallies if not t.safety}
     rows = []
     for tally in (t for t in safety.tallies if t.safety):

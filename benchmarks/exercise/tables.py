@@ -54,8 +54,14 @@ def check_table(model: Model) -> TextTable:
 
 def range_table(model: Model, devices: Sequence[Device]) -> TextTable:
     """Moments of every configuration at constant and at scheduled pressure."""
-    header = ["Configuration", "Standing", "Constant | kPa", "Constant | 90 deg"]
-    header += ["Set once | kPa", *(f"Set once | {angle} deg" for angle in SCHEDULED_DEG)]
+    header = [
+        "Configuration",
+        "Standing",
+        "Constant | kPa",
+        "Constant | 90 deg",
+        "Set once | kPa",
+        *(f"Set once | {angle} deg" for angle in SCHEDULED_DEG),
+    ]
     rows = [_range_row(model, device) for device in devices]
     title = "Range of moments (N m); scaled: extrapolated from the tested muscle"
     return TextTable(title, header, rows, words=2)

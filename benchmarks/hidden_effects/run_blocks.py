@@ -16,7 +16,7 @@ from benchmarks.hidden_effects.evaluation.rounds import Judge, Work, diagnosed
 from benchmarks.hidden_effects.evaluation.summary import report
 from benchmarks.hidden_effects.evaluation.targets import RATES, percent
 from benchmarks.hidden_effects.evaluation.verdicts import Outcome
-from benchmarks.hidden_effects.generation.blocks import Block
+from benchmarks.hidden_effects.generation.cases import Block
 from benchmarks.hidden_effects.generation.undecidable import BLOCKS
 from benchmarks.runner.fingerprint import code_digest_with
 from pma_gym.document_shape import ListOf, ShapeError, Whole, check_shape

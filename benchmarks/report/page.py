@@ -176,8 +176,11 @@ def _ranking_blocks(leaderboard: Leaderboard) -> list[Block]:
     labels = leaderboard.labels
     # What pools all tasks stands first.
     shown = sorted(leaderboard.shown, key=lambda each: each.errors.measure.unit != PERCENT)
-    blocks: list[Block] = [Heading("Ranking"), Paragraph(_RANKS)]
-    blocks += [standings_table(each, labels) for each in shown]
+    blocks: list[Block] = [
+        Heading("Ranking"),
+        Paragraph(_RANKS),
+        *(standings_table(each, labels) for each in shown),
+    ]
     if leaderboard.by_task:
         blocks.append(tasks_table(leaderboard.by_task, labels))
     if leaderboard.shown and len(leaderboard.shown[-1].rivals) > 1:

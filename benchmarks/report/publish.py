@@ -114,9 +114,19 @@ def _compute(leaderboard: Leaderboard, progress: OnStep) -> None:
 def numbers_csv(leaderboard: Leaderboard) -> str:
     """A row a controller and measure or task, with all digits; errors in the row's unit."""
     intervals = ("mean", "median", "worst", "to_best", "to_bound")
-    header = ["suite", "version", "measure", "unit", "controller", "cases", "failures"]
-    header += ["best_rank", "worst_rank", "percent_of_range"]
-    header += [f"{name}{end}" for name in intervals for end in ("", "_low", "_high")]
+    header = [
+        "suite",
+        "version",
+        "measure",
+        "unit",
+        "controller",
+        "cases",
+        "failures",
+        "best_rank",
+        "worst_rank",
+        "percent_of_range",
+        *(f"{name}{end}" for name in intervals for end in ("", "_low", "_high")),
+    ]
     suite, rows = leaderboard.suite, []
     every = leaderboard.by_task | leaderboard.standings
     for name, standings in every.items():
@@ -134,8 +144,15 @@ def numbers_csv(leaderboard: Leaderboard) -> str:
 
 def pairs_csv(leaderboard: Leaderboard) -> str:
     """A row a measure and pair of controllers: probability of improvement and ratio."""
-    header = ["suite", "version", "measure", "first", "second", "first_is_better"]
-    header += [f"{name}{end}" for name in ("improvement", "ratio") for end in ("", "_low", "_high")]
+    header = [
+        "suite",
+        "version",
+        "measure",
+        "first",
+        "second",
+        "first_is_better",
+        *(f"{name}{end}" for name in ("improvement", "ratio") for end in ("", "_low", "_high")),
+    ]
     suite = leaderboard.suite
 
     def cells(name: str, pair: Pair) -> list[object]:

@@ -111,11 +111,17 @@ def standings_table(standings: Standings, labels: Labels) -> TextTable:
     """Ranks and means of a measure, the best rival first, the bounds last."""
     measure = standings.errors.measure
     unit = measure.unit
-    header = ["Rank", "Controller"]
-    header += [f"Interquartile mean | {unit}", "Interquartile mean | 95 % interval"]
-    header += [] if unit == PERCENT else ["Interquartile mean | % of range"]
-    header += [f"Median ({unit})", f"Worst tenth ({unit})"]
-    header += ["Over the best | ratio", "Over the best | 95 % interval"]
+    header = [
+        "Rank",
+        "Controller",
+        f"Interquartile mean | {unit}",
+        "Interquartile mean | 95 % interval",
+        *([] if unit == PERCENT else ["Interquartile mean | % of range"]),
+        f"Median ({unit})",
+        f"Worst tenth ({unit})",
+        "Over the best | ratio",
+        "Over the best | 95 % interval",
+    ]
     bounded = standings.bound is not None
     header += ["Over the oracle | ratio", "Over the oracle | 95 % interval"] if bounded else []
     rows = [_standing_cells(row, labels, unit, bounded) for row in standings.rows]
@@ -130,9 +136,12 @@ def ranks_table(standings: Sequence[Standings], labels: Labels) -> TextTable:
         standings: the measures; controllers stand in the order of the first.
         labels: what people call the controllers.
     """
-    header = ["Controller"]
-    header += [
-        f"{capital(each.errors.measure.name)} ({each.errors.measure.unit})" for each in standings
+    header = [
+        "Controller",
+        *(
+            f"{capital(each.errors.measure.name)} ({each.errors.measure.unit})"
+            for each in standings
+        ),
     ]
     columns = [{row.name: row for row in each.rows} for each in standings]
     names = dict.fromkeys(name for column in columns for name in column)
@@ -173,11 +182,22 @@ def pair_table(standings: Standings, labels: Labels) -> TextTable:
     rows = []
     for first, second in combinations(names, 2):
         better, ratio = pairs[first, second], pairs[second, first].ratio
-        cells = [labels.get(first, first), labels.get(second, second), figure(ratio.estimate)]
-        cells += [ends(ratio), f"{better.improvement.estimate * cases:g} of {cases}"]
+        cells = [
+            labels.get(first, first),
+            labels.get(second, second),
+            figure(ratio.estimate),
+            ends(ratio),
+            f"{better.improvement.estimate * cases:g} of {cases}",
+        ]
         rows.append([*cells, "**yes**" if better.separated else "no"])
-    header = ["A", "B", "Error of B over that of A | ratio"]
-    header += ["Error of B over that of A | 95 % interval", "A's is smaller (cases)", "Differ"]
+    header = [
+        "A",
+        "B",
+        "Error of B over that of A | ratio",
+        "Error of B over that of A | 95 % interval",
+        "A's is smaller (cases)",
+        "Differ",
+    ]
     return TextTable(f"{capital(standings.errors.measure.name)}: pairs", header, rows, words=2)
 
 
@@ -191,11 +211,23 @@ def _ratio_cells(ratio: Interval | None) -> tuple[str, str]:
 
 def spending_table(rows: Sequence[Spending], title: str, unit: str, labels: Labels) -> TextTable:
     """Start and steady errors, effort, limits, computing time."""
-    header = ["Controller", f"RMSE ({unit}) | first 0.5 s", f"RMSE ({unit}) | the rest"]
-    header += [f"Largest error ({unit})", "Effort (V)", "Variation (V/s)", "Saturated (%)"]
-    header += ["Clipped | % of steps", "Clipped | at most by (V)"]
-    header += ["Beyond a soft limit | % of cases", "Beyond a soft limit | at most (%)"]
-    header += ["act (us) | median", "act (us) | 99 %", "Real-time factor", "Failed"]
+    header = [
+        "Controller",
+        f"RMSE ({unit}) | first 0.5 s",
+        f"RMSE ({unit}) | the rest",
+        f"Largest error ({unit})",
+        "Effort (V)",
+        "Variation (V/s)",
+        "Saturated (%)",
+        "Clipped | % of steps",
+        "Clipped | at most by (V)",
+        "Beyond a soft limit | % of cases",
+        "Beyond a soft limit | at most (%)",
+        "act (us) | median",
+        "act (us) | 99 %",
+        "Real-time factor",
+        "Failed",
+    ]
     cells = [
         [
             labels.get(row.name, row.name),

@@ -61,10 +61,12 @@ def rmse_plot(results: Results, task: str) -> Plot:
         axes[0, 0].yaxis.set_major_formatter("{x:g}")
         axes[-1, 0].set_xticks(pressures, [f"{p:g}" for p in pressures])
         axes[-1, 0].set_xlabel("pressure (kPa)")
-        handles = [Line2D([], [], label="Measured", **MEASURED)]
-        handles += [
-            Line2D([], [], color=style.color, marker=style.marker, label=style.label)
-            for style in styles.values()
+        handles = [
+            Line2D([], [], label="Measured", **MEASURED),
+            *(
+                Line2D([], [], color=style.color, marker=style.marker, label=style.label)
+                for style in styles.values()
+            ),
         ]
         if "III" in phases and results.bounds:
             handles.append(Line2D([], [], label="Achievable bound", **BOUND))
@@ -122,10 +124,10 @@ def tracking_plot(results: Results, task: str) -> Plot:
             panels[-1].set_xlabel("time (s)")
         axes[0, 0].set_ylabel(f"{LABELS[task]} ({unit})")
         axes[1, 0].set_ylabel(f"actual − ideal ({unit})")
-        axes[2, 0].set_ylabel(f"actual − ideal ({unit}),\nenlarged")
-        axes[2, 0].set_ylim(-_ENLARGED[task], _ENLARGED[task])
-        axes[3, 0].set_ylabel("motor voltage (V)")
-        axes[3, 0].set_ylim(0.0, None)
+        axes[2, 0].set(
+            ylabel=f"actual − ideal ({unit}),\nenlarged", ylim=(-_ENLARGED[task], _ENLARGED[task])
+        )
+        axes[3, 0].set(ylabel="motor voltage (V)", ylim=(0.0, None))
         figure.align_ylabels()
         legend_below(figure, _handles(styles), 3)
         return figure

@@ -55,8 +55,7 @@ def rmse_table(results: Results, model: str, task: str, phase: str) -> TextTable
     who = columns(results, model, task, phase)
     pressures = results.suite.pressures_kpa[task]
     bounded = phase == "III" and model == results.suite.models[0] and bool(results.bounds)
-    header = ["Pressure (kPa)"]
-    header += [f"{name} | {part}" for name in who for part in (unit, "%")]
+    header = ["Pressure (kPa)", *(f"{name} | {part}" for name in who for part in (unit, "%"))]
     rows = [
         [f"{p:g}", *(text for figures in who.values() for text in _rmse_cells(figures(p)))]
         for p in pressures
@@ -94,8 +93,7 @@ def replay_table(errors: Sequence[ReplayError]) -> TextTable:
     """Signed errors of the replay in one phase, trial by trial, and their means."""
     unit = UNITS[errors[0].task]
     means = summarise(errors)
-    header = ["Pressure (kPa)", f"slope ({unit}/s)"]
-    header += [f"{name} ({unit})" for name in REPLAY_NAMES]
+    header = ["Pressure (kPa)", f"slope ({unit}/s)", *(f"{name} ({unit})" for name in REPLAY_NAMES)]
     rows = [
         [f"{error.pressure_kpa:g}", *(f"{getattr(error, name):+.3f}" for name in QUANTITIES)]
         for error in errors

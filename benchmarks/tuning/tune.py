@@ -40,8 +40,7 @@ import numpy as np
 from rich.progress import Progress
 from scipy.optimize import minimize
 
-from benchmarks.executors.choice import local
-from benchmarks.executors.executor import ProcessDied, run_all
+from benchmarks.executors.executor import ProcessDied, local, run_all
 from benchmarks.files import toml_document, write_text
 from benchmarks.tuning.cost import Cost, chosen
 from benchmarks.tuning.loop_margins import Job, KeptRows, lambda_tuning, name_of
@@ -52,8 +51,7 @@ from controllers.design.designs import (
     column_names,
     read_settings,
 )
-from controllers.feedforward_pid import FeedforwardPID
-from controllers.pid import PID
+from controllers.pid import PID, FeedforwardPID
 from pma_gym.document_shape import check_shape
 from pma_gym.plant.model import Model, dump_model, load_model
 from pma_gym.plant.plant import Plant
@@ -235,8 +233,10 @@ def _tables(jobs: list[Job], results: list[tuple[Gains, float]]) -> dict[str, An
 def _provenance(model: Model, seed: int) -> str:
     """What gains depend on, in one line."""
     digest = hashlib.sha256(dump_model(model).encode()).hexdigest()[:16]
-    versions = [f"Python {platform.python_version()}"]
-    versions += [f"{name} {version(name)}" for name in ("numpy", "scipy", "llvmlite")]
+    versions = [
+        f"Python {platform.python_version()}",
+        *(f"{name} {version(name)}" for name in ("numpy", "scipy", "llvmlite")),
+    ]
     return f"tuned on the model {digest}, seed {seed}; {' '.join(versions)}"
 
 

@@ -28,9 +28,12 @@ def commands(program: str) -> str:
 def _command(called: str, command: Any) -> str:  # noqa: ANN401 - typer does not export its type
     arguments = [p for p in command.params if p.param_type_name == "argument"]
     options = [p for p in command.params if p.param_type_name == "option" and not p.hidden]
-    usage = [called, *(p.name.upper() for p in arguments)]
-    usage += [f"{p.opts[0]} {p.name.upper()}" for p in options if p.required]
-    usage += ["[OPTIONS]"] if any(not p.required for p in options) else []
+    usage = [
+        called,
+        *(p.name.upper() for p in arguments),
+        *(f"{p.opts[0]} {p.name.upper()}" for p in options if p.required),
+        *(["[OPTIONS]"] if any(not p.required for p in options) else []),
+    ]
     text = " ".join((command.help or "").split())
     example = (command.epilog or "").removeprefix("Example: ")
     parts = [f"### {called}", text, f"```text\n{' '.join(usage)}\n```"]

@@ -20,8 +20,7 @@ import numpy as np
 
 from benchmarks.hidden_effects.evaluation import records
 from benchmarks.hidden_effects.evaluation.verdicts import compare, judged
-from benchmarks.hidden_effects.generation.blocks import Block
-from benchmarks.hidden_effects.generation.cases import Case, measure
+from benchmarks.hidden_effects.generation.cases import Block, Case, measure
 from benchmarks.hidden_effects.generation.files import (
     Volts,
     case_name,

@@ -319,8 +319,10 @@ def naming_picture(ranges: Sequence[Mapping[str, Any]]) -> bytes:
         panel.set_xscale("log")
         panel.set_xticks([0.1, 0.2, 0.3, 0.5, 1.0, 2.0], ["0.1", "0.2", "0.3", "0.5", "1", "2"])
         panel.minorticks_off()
-        panel.set_ylim(0.0, 103.0)
-        panel.set_xlabel("size r of the effect over the noise, after a refit without it")
-        panel.set_ylabel("cases (%)")
+        panel.set(
+            ylim=(0.0, 103.0),
+            xlabel="size r of the effect over the noise, after a refit without it",
+            ylabel="cases (%)",
+        )
         legend_below(drawn, panel.get_legend_handles_labels()[0], 3)
         return png(drawn)

@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 
 from pma_gym.data.files.trial_formats import DECODERS
-from pma_gym.data.readers.cells import cell_number, decimal_mark
 from pma_gym.data.readers.table import (
     PART,
     Cells,
@@ -17,6 +16,8 @@ from pma_gym.data.readers.table import (
     Request,
     Table,
     UnreadableError,
+    cell_number,
+    decimal_mark,
 )
 from pma_gym.data.trial_columns import ColumnMap, TrialError, suggestion
 from pma_gym.files import as_path

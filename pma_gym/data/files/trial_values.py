@@ -11,10 +11,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pma_gym.data.files.trial_hints import mapping_line
-from pma_gym.data.readers.cells import cell_number, has_groups, looks_ambiguous
 from pma_gym.data.readers.clock import clock_seconds, epoch_seconds
 from pma_gym.data.readers.layout import unit_factor
-from pma_gym.data.readers.table import Cells, FileFormat, Table, shown
+from pma_gym.data.readers.table import (
+    Cells,
+    FileFormat,
+    Table,
+    cell_number,
+    has_groups,
+    looks_ambiguous,
+    shown,
+)
 from pma_gym.data.trial_checks import check_values
 from pma_gym.data.trial_columns import ColumnMap, Source, TrialError
 

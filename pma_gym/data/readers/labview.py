@@ -11,10 +11,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pma_gym.data.readers.cells import cell_number
 from pma_gym.data.readers.clock import Channel, clock_seconds, on_rows, reference_times
 from pma_gym.data.readers.layout import Row, arrange, check_widths, split_lines
-from pma_gym.data.readers.table import Request, Table, UnreadableError
+from pma_gym.data.readers.table import Request, Table, UnreadableError, cell_number
 from pma_gym.limits import check_limit
 
 END = "***end_of_header***"

@@ -12,11 +12,13 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.executors.choice import ExecutorName, executor_named, local
 from benchmarks.executors.executor import (
+    ExecutorName,
     ProcessDied,
     ThisProcess,
     TookTooLong,
+    executor_named,
+    local,
     run_all,
     run_or_raise,
 )
@@ -168,7 +170,7 @@ ORPHANS = """
 import sys
 from functools import partial
 from pathlib import Path
-from benchmarks.executors.choice import ExecutorName, executor_named
+from benchmarks.executors.executor import ExecutorName, executor_named
 from benchmarks.executors.executor import run_all
 from tests.benchmarks.executors.pieces import sleeps
 

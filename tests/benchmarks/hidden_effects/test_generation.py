@@ -11,8 +11,7 @@ from benchmarks.hidden_effects import physics
 from benchmarks.hidden_effects.evaluation import scoring
 from benchmarks.hidden_effects.evaluation.verdicts import compare, judged
 from benchmarks.hidden_effects.generation import files
-from benchmarks.hidden_effects.generation.blocks import BLOCKS, Block
-from benchmarks.hidden_effects.generation.cases import draw_case
+from benchmarks.hidden_effects.generation.cases import BLOCKS, Block, draw_case
 from benchmarks.hidden_effects.generation.effect_size import simulate_variants
 from benchmarks.hidden_effects.generation.effects import ALL, KINDS
 from benchmarks.hidden_effects.generation.excitation import EXCITATIONS, draw_trial

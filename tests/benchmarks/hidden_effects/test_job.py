@@ -9,14 +9,14 @@ import pytest
 from typer.testing import CliRunner
 
 from benchmarks.__main__ import app
-from benchmarks.executors.choice import local
+from benchmarks.executors.executor import local
 from benchmarks.hidden_effects import run_blocks
 from benchmarks.hidden_effects.evaluation import scoring
 from benchmarks.hidden_effects.evaluation.records import measured_text, method_digest
 from benchmarks.hidden_effects.evaluation.rounds import Answer, follow, with_trial
 from benchmarks.hidden_effects.evaluation.targets import RATES
 from benchmarks.hidden_effects.evaluation.verdicts import compare, unanswered
-from benchmarks.hidden_effects.generation.blocks import Block
+from benchmarks.hidden_effects.generation.cases import Block
 from benchmarks.hidden_effects.generation.effect_size import UNTOLD, simulate_variants
 from benchmarks.hidden_effects.generation.effects import KINDS
 from benchmarks.hidden_effects.generation.files import random_experiment
