@@ -9,7 +9,7 @@ from controllers.design.designs import EXERCISE_KINDS, KINDS
 from controllers.policies.adapter import ActionMapping
 from controllers.policies.network import ACTIVATIONS, OUTPUTS
 from controllers.policies.observation_spec import ObservationSpec
-from pma_gym.document_shape import ListOf, Maybe, Real, Whole, check_shape
+from pma_gym.document_shape import ListOf, Maybe, Real, ShapeError, Whole, check_shape
 from pma_gym.documents import parse_json
 
 SCHEMA = 1
@@ -66,13 +66,15 @@ def parsed_document(text: bytes) -> dict[str, Any]:
     Args:
         text: content of the file.
     Raises:
-        ValueError: what is wrong, as a `PolicyError` or a `ShapeError`.
+        PolicyError: what is wrong.
     """
     try:
         document: Any = parse_json(text, "the file")
+        check_shape(document, SHAPE)
+    except ShapeError as error:
+        raise PolicyError(str(error)) from None
     except ValueError as error:
         raise PolicyError(f"it is no JSON that can be used ({error})") from None
-    check_shape(document, SHAPE)
     rule = f"{SCHEMA}, the one that is known here"
     _check(document["schema"] == SCHEMA, "schema", rule, document["schema"])
     network, rate = document["network"], document["environment"]["kwargs"]["control_rate_hz"]
