@@ -114,16 +114,19 @@ def replay(run: Run) -> str:
             values = [[error[column] for error in errors] for column in _REPLAY_COLUMNS]
             cells = [f"{fmean(v):+.2f} ({fmean(map(abs, v)):.2f})" for v in values]
             rows.append([f"{name} ({UNITS[task]})", *cells])
-    header = [
-        "Simulated less measured",
-        "slope (per s)",
-        "intercept",
-        "mean position",
-        "RMSE",
-        "line part",
-        "scatter",
-    ]
-    return _table(header, rows, words=1)
+    return _table(
+        [
+            "Simulated less measured",
+            "slope (per s)",
+            "intercept",
+            "mean position",
+            "RMSE",
+            "line part",
+            "scatter",
+        ],
+        rows,
+        words=1,
+    )
 
 
 def parts(run: Run) -> str:
@@ -160,15 +163,18 @@ def reading(run: Run) -> str:
     every = run["rotation_reading"]
     whole = [fmean(abs(e[who] - e["measured"]) for e in every) for who in ("plain", "read")]
     rows.append(["all", "", "", "", *(f"{value:.2f}" for value in whole)])
-    header = [
-        "Table 30, RMSE (deg)",
-        "measured",
-        "replay",
-        "replay as it may have been read",
-        "mean absolute error: replay",
-        "as read",
-    ]
-    return _table(header, rows, words=1)
+    return _table(
+        [
+            "Table 30, RMSE (deg)",
+            "measured",
+            "replay",
+            "replay as it may have been read",
+            "mean absolute error: replay",
+            "as read",
+        ],
+        rows,
+        words=1,
+    )
 
 
 def bound(run: Run) -> str:

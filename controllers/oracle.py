@@ -87,8 +87,7 @@ def horizon(period: float, delay: int) -> Horizon:
     own = np.arange(len(periods)) - np.repeat(np.cumsum(counts) - counts, counts) + 1
     ends = (periods - delay) * parts + np.round(own * parts / counts[periods]).astype(int)
     weights = np.where(periods < delay, 0.0, np.sqrt(np.diff(ends, prepend=-delay * parts)))
-    blocks = np.repeat(np.arange(len(lengths)), lengths)
-    return Horizon(parts, blocks, periods, ends, weights)
+    return Horizon(parts, np.repeat(np.arange(len(lengths)), lengths), periods, ends, weights)
 
 
 def block_lengths(period: float) -> list[int]:

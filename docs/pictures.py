@@ -93,8 +93,7 @@ def _leaderboard_table(page: str) -> tuple[list[str], list[str], list[list[Inter
         for suite, name in zip(("robust", "robust", "hard", "hard"), header[1:], strict=True)
     ]
     names = [row[0].replace(", tenth trial", "").replace(", shipped", "") for row in rows]
-    cells = [[_interval(row[at]) for row in rows] for at in range(1, len(header))]
-    return names, columns, cells
+    return names, columns, [[_interval(row[at]) for row in rows] for at in range(1, len(header))]
 
 
 def _interval(cell: str) -> Interval | None:
@@ -148,8 +147,7 @@ def _frames(title: str, controller: Controller) -> list[np.ndarray]:
     controller.reset(env.reference, env.station)
     frames, ended = [_frame(title, env.render())], False
     while not ended:
-        action = env.action(controller.act(env.reading, env.time))
-        _, _, terminated, truncated, _ = env.step(action)
+        _, _, terminated, truncated, _ = env.step(env.action(controller.act(env.reading, env.time)))
         ended = terminated or truncated
         if env.time * FRAMES_PER_SECOND >= len(frames) - 1e-9:
             frames.append(_frame(title, env.render()))

@@ -101,8 +101,13 @@ def environment_plot() -> bytes:
         shown.set_axis_off()
         axes: Any = below.subplots(1, 2 + len(SIGNALS))
         time = period * np.arange(len(observations))
-        volts = f"action (1.0 = {scales['last motor action']})"
-        axes[0].step(time[:-1], actions, where="post", color="#D55E00", label=volts)
+        axes[0].step(
+            time[:-1],
+            actions,
+            where="post",
+            color="#D55E00",
+            label=f"action (1.0 = {scales['last motor action']})",
+        )
         for axis, entries in zip(axes[1:-1], SIGNALS, strict=True):
             for entry, style in zip(entries, ENTRY_STYLES, strict=True):
                 values = observations[:, list(scales).index(entry)]

@@ -43,8 +43,7 @@ def _ending_in_words(function: Callable[..., Any]) -> Callable[..., Any]:
         except (ExecutorMissing, ValueError) as error:
             refuse(error)
         except KeyboardInterrupt:
-            again = "Interrupted; the same command again goes on from what is kept"
-            print(again, file=sys.stderr)
+            print("Interrupted; the same command again goes on from what is kept", file=sys.stderr)
             raise typer.Exit(INTERRUPTED) from None
 
     return run

@@ -82,5 +82,4 @@ def export(
     usual = RESULTS / "policies" / model.stem
     if out is None:
         usual.parent.mkdir(parents=True, exist_ok=True)
-    written = export_model(model, env, kwargs, out or usual, vecnormalize, onnx)
-    print("\n".join(map(str, written)))
+    print("\n".join(map(str, export_model(model, env, kwargs, out or usual, vecnormalize, onnx))))

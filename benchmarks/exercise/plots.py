@@ -75,8 +75,13 @@ def _label_end(axis: Axes, device: Device, moment: np.ndarray, color: str) -> No
     """A configuration's name at the right end of its line."""
     if np.isfinite(moment[-1]):
         number, diameter, length = device.muscles
-        name = f"{number} x {1e3 * diameter:g} x {1e3 * length:g} mm"
-        axis.annotate(name, (575, moment[-1]), (4, -3), textcoords="offset points", color=color)
+        axis.annotate(
+            f"{number} x {1e3 * diameter:g} x {1e3 * length:g} mm",
+            (575, moment[-1]),
+            (4, -3),
+            textcoords="offset points",
+            color=color,
+        )
 
 
 def _draw_angles(axis: Axes, model: Model, answer: Answer | None) -> None:
@@ -90,8 +95,13 @@ def _draw_angles(axis: Axes, model: Model, answer: Answer | None) -> None:
     _draw_band(axis, model, own, None, "#0072B2", "tested muscle, cable set once")
     for pressure, line in ((275e3, "--"), (575e3, "-")):
         moment = resistive_moment(model, own, pressure, angle).moment
-        name = f"tested muscle, constant {1e-3 * pressure:g} kPa"
-        axis.plot(degrees, moment, color="#0072B2", linestyle=line, label=name)
+        axis.plot(
+            degrees,
+            moment,
+            color="#0072B2",
+            linestyle=line,
+            label=f"tested muscle, constant {1e-3 * pressure:g} kPa",
+        )
     if answer is not None:
         _draw_answer(axis, model, answer)
     axis.set(xlabel="angle (deg), 90 = straight leg", ylabel="moment (N m)", xlim=(0, 90))
@@ -130,5 +140,6 @@ def _draw_band(
         edge(swept.moment[some], axis=1, where=swept.allowed[some], initial=worst)
         for edge, worst in ((np.min, np.inf), (np.max, -np.inf))
     )
-    degrees = angle[some] / _DEG
-    axis.fill_between(degrees, low, high, color=color, alpha=0.15, linewidth=0, label=label)
+    axis.fill_between(
+        angle[some] / _DEG, low, high, color=color, alpha=0.15, linewidth=0, label=label
+    )

@@ -41,15 +41,18 @@ def check_table(model: Model) -> TextTable:
         ]
         for check in check_moments(model)
     ]
-    header = [
-        "Pressure (kPa)",
-        "Model",
-        "Table I3",
-        "Difference (%)",
-        "Table 23",
-        "% of the knee",
-    ]
-    return TextTable("Tested muscle: moment (N m) at 90 deg", header, rows)
+    return TextTable(
+        "Tested muscle: moment (N m) at 90 deg",
+        [
+            "Pressure (kPa)",
+            "Model",
+            "Table I3",
+            "Difference (%)",
+            "Table 23",
+            "% of the knee",
+        ],
+        rows,
+    )
 
 
 def range_table(model: Model, devices: Sequence[Device]) -> TextTable:
@@ -63,8 +66,9 @@ def range_table(model: Model, devices: Sequence[Device]) -> TextTable:
         *(f"Set once | {angle} deg" for angle in SCHEDULED_DEG),
     ]
     rows = [_range_row(model, device) for device in devices]
-    title = "Range of moments (N m); scaled: extrapolated from the tested muscle"
-    return TextTable(title, header, rows, words=2)
+    return TextTable(
+        "Range of moments (N m); scaled: extrapolated from the tested muscle", header, rows, words=2
+    )
 
 
 def _range_row(model: Model, device: Device) -> list[str]:
@@ -104,15 +108,18 @@ def knee_table(model: Model) -> TextTable:
         [f"{a}", f"{90 - a}", f"{k:.0f}", f"{lo:.1f}", f"{hi:.1f}", f"{100 * hi / k:.0f}"]
         for a, k, lo, hi in zip(angles, knee, low, high, strict=True)
     ]
-    header = [
-        "Angle (deg)",
-        "Flexion (deg)",
-        "Knee",
-        "Tested muscle | 275 kPa",
-        "Tested muscle | 575 kPa",
-        "Tested muscle | % of knee",
-    ]
-    return TextTable("A young adult's knee beside the tested muscle (N m)", header, rows)
+    return TextTable(
+        "A young adult's knee beside the tested muscle (N m)",
+        [
+            "Angle (deg)",
+            "Flexion (deg)",
+            "Knee",
+            "Tested muscle | 275 kPa",
+            "Tested muscle | 575 kPa",
+            "Tested muscle | % of knee",
+        ],
+        rows,
+    )
 
 
 def makers_table(model: Model) -> TextTable:
@@ -122,8 +129,12 @@ def makers_table(model: Model) -> TextTable:
         + [f"{figure.maker:.4g}", f"{figure.ours:.4g}", f"{figure.percent:+.0f}"]
         for figure in makers_figures(model)
     ]
-    header = ["Figure", "Source", "Maker", "Scaled", "%"]
-    return TextTable("Makers' figures at 600 kPa beside the scaled ones", header, rows, words=2)
+    return TextTable(
+        "Makers' figures at 600 kPa beside the scaled ones",
+        ["Figure", "Source", "Maker", "Scaled", "%"],
+        rows,
+        words=2,
+    )
 
 
 def terminal_table(table: TextTable) -> Table:

@@ -69,8 +69,13 @@ def _blocks(result: Measured) -> list[Block]:
     ]
     for phase, label in PHASE_NAMES.items():
         unit = "mm" if phase == "displacement" else "deg"
-        title = f"{label}: mean absolute error ({unit}, slope in {unit}/s)"
-        blocks.append(TextTable(title, REPLAY_HEADER, replay_rows(result, phase)))
+        blocks.append(
+            TextTable(
+                f"{label}: mean absolute error ({unit}, slope in {unit}/s)",
+                REPLAY_HEADER,
+                replay_rows(result, phase),
+            )
+        )
     blocks.append(Heading("What these tables cannot tell"))
     blocks.append(
         TextTable(
@@ -108,8 +113,7 @@ def errors_picture(result: Measured) -> bytes:
             one = panel.barh(at - 0.2, unseen, 0.38, color=PARAMETERS, label="took no part")
             two = panel.barh(at + 0.2, seen, 0.38, color=AFTER, label="fitted to")
             panel.bar_label(one, [f"{value:.2f}" for value in unseen], padding=2, fontsize=8)
-            line = panel.axvline(result.floors[key], label="repeats", **FLOOR)
-            handles = [one, two, line]
+            handles = [one, two, panel.axvline(result.floors[key], label="repeats", **FLOOR)]
             panel.set(
                 xscale="log",
                 xlim=(0.4 * result.floors[key], 2.2 * max(*unseen, *seen)),

@@ -72,8 +72,9 @@ def _figure(standings: Standings, styles: Mapping[str, Style]) -> InteractiveFig
         "to see it alone; drag to zoom, double-click to zoom out."
     )
     name = "cases-" + "-".join(errors.measure.name.split())
-    label = f"RMSE ({errors.measure.unit})"
-    return InteractiveFigure(name, caption, "pressure (kPa)", label, traces, logarithmic=True)
+    return InteractiveFigure(
+        name, caption, "pressure (kPa)", f"RMSE ({errors.measure.unit})", traces, logarithmic=True
+    )
 
 
 _RANKS = (

@@ -305,8 +305,12 @@ def obstacle_table(
         ]
         rows.append([task, f"{kpa:g}", why, f"{errors.measure.name} ({errors.measure.unit})"])
         rows[-1] += cells
-    header = ["Task", "Pressure (kPa)", "Why", "Mean error of", "Oracle", "Best rival"]
-    return TextTable("Obstacles", header, rows, words=4)
+    return TextTable(
+        "Obstacles",
+        ["Task", "Pressure (kPa)", "Why", "Mean error of", "Oracle", "Best rival"],
+        rows,
+        words=4,
+    )
 
 
 def _leaders(standings: Standings) -> tuple[int | None, int | None]:
@@ -326,8 +330,9 @@ def verdict_table(checks: Sequence[Verdict]) -> TextTable:
         ]
         for check in checks
     ]
-    header = ["What", "Target", "This run", "95 % interval", "Verdict"]
-    return TextTable("What the suite asks for", header, rows)
+    return TextTable(
+        "What the suite asks for", ["What", "Target", "This run", "95 % interval", "Verdict"], rows
+    )
 
 
 def failure_table(record: SuiteRecord, labels: Labels) -> TextTable:
@@ -343,8 +348,12 @@ def failure_table(record: SuiteRecord, labels: Labels) -> TextTable:
         ]
         for (name, reason), cases in groups.items()
     ]
-    header = ["Controller", "Case (station/task/kPa/repeat)", "Why"]
-    return TextTable("Cases without figures", header, rows, words=3)
+    return TextTable(
+        "Cases without figures",
+        ["Controller", "Case (station/task/kPa/repeat)", "Why"],
+        rows,
+        words=3,
+    )
 
 
 def capital(text: str) -> str:

@@ -235,8 +235,14 @@ def rmse_figure(results: Results, task: str) -> InteractiveFigure:
         if phase == "III" and results.bounds:
             values = [results.bounds.get(p, nan) for p in pressures]
             traces.append(Trace("Achievable bound", pressures, values, view=view))
-    caption = f"RMSE by pressure, on a logarithmic scale. {_HOW}"
-    return InteractiveFigure(f"rmse-{task}", caption, "pressure (kPa)", "", traces, True)
+    return InteractiveFigure(
+        f"rmse-{task}",
+        f"RMSE by pressure, on a logarithmic scale. {_HOW}",
+        "pressure (kPa)",
+        "",
+        traces,
+        True,
+    )
 
 
 def tracking_figure(results: Results, task: str) -> InteractiveFigure:
@@ -267,8 +273,13 @@ def replay_figure(results: Results) -> InteractiveFigure:
                 x = [trial.pressure_kpa for trial in trials]
                 y = [getattr(trial, quantity) for trial in trials]
                 traces.append(Trace(name, x, y, _PHASES[phase], view=f"{task}: {label}"))
-    caption = f"Simulated less measured, trial by trial. {_HOW}"
-    return InteractiveFigure("replay-errors", caption, "pressure (kPa)", "", traces)
+    return InteractiveFigure(
+        "replay-errors",
+        f"Simulated less measured, trial by trial. {_HOW}",
+        "pressure (kPa)",
+        "",
+        traces,
+    )
 
 
 def _trial_traces(results: Results, task: str, pressure: float, points: int) -> Iterator[Trace]:

@@ -125,8 +125,7 @@ def _rotation_profile(pressure_kpa: float) -> np.ndarray:
     for number in range(13, 21):
         table = load_table(f"I{number}")
         if float(table["pressure_kpa"][0]) == pressure_kpa:
-            holding_phase = (table["time_s"] >= 5.0) & (table["time_s"] < 10.0)
-            return table["motor_voltage_v"][holding_phase]
+            return table["motor_voltage_v"][(table["time_s"] >= 5.0) & (table["time_s"] < 10.0)]
     raise KeyError(f"no rotation trial at {pressure_kpa:g} kPa")
 
 

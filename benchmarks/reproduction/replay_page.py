@@ -137,8 +137,9 @@ def _against_simple_prediction(results: Results, errors: Sequence[ReplayError]) 
         f"Displacement, {means.trials} trials, beside the simple prediction "
         "(table I3 read at the printed voltages, lagged by 2.90/K)"
     )
-    header = ["", "Mean error", "Mean absolute error", "Simple prediction", "Difference"]
-    return TextTable(title, header, rows)
+    return TextTable(
+        title, ["", "Mean error", "Mean absolute error", "Simple prediction", "Difference"], rows
+    )
 
 
 def _hold_blocks(results: Results, errors: Sequence[ReplayError]) -> list[Block]:

@@ -235,8 +235,7 @@ def _reported(
     with console.status("driving the trials that are drawn, computing the achievable bounds"):
         results = _results(suite, run, out, executor)
     run.finish(out)
-    info = {**results.info, "wall_time_s": run.info["wall_time_s"]}
-    results = replace(results, info=info)
+    results = replace(results, info={**results.info, "wall_time_s": run.info["wall_time_s"]})
     with console.status("writing the report"):
         write_report(results, out)
     return results

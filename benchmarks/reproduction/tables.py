@@ -45,8 +45,11 @@ def summary_table(results: Results) -> TextTable:
                 failed = len(known) < len(pressures)
                 cell = MISSING if failed else f"{fmean(known):.3g} ({max(known):.3g})"
                 rows.setdefault(who, []).append(cell)
-    title = f"RMSE on {main}: mean (largest) over the pressures"
-    return TextTable(title, header, [[who, *cells] for who, cells in rows.items()])
+    return TextTable(
+        f"RMSE on {main}: mean (largest) over the pressures",
+        header,
+        [[who, *cells] for who, cells in rows.items()],
+    )
 
 
 def rmse_table(results: Results, model: str, task: str, phase: str) -> TextTable:
@@ -71,8 +74,11 @@ def rmse_table(results: Results, model: str, task: str, phase: str) -> TextTable
         rows = [[*row, _number(b, 3)] for row, b in zip(rows, bounds, strict=True)]
         mean.append(_mean(bounds))
     number, part = ("22", "") if task == "displacement" else ("30", f", phase {phase}")
-    title = f"Table {number}{part}: RMSE against the ideal, and in percent of the range"
-    return TextTable(title, header, [*rows, RULE, mean])
+    return TextTable(
+        f"Table {number}{part}: RMSE against the ideal, and in percent of the range",
+        header,
+        [*rows, RULE, mean],
+    )
 
 
 def regression_table(results: Results, model: str, task: str, phase: str) -> TextTable:
@@ -85,8 +91,12 @@ def regression_table(results: Results, model: str, task: str, phase: str) -> Tex
         rows.append([f"{pressure:g}", f"intercept ({unit})", *map(_intercept, scores)])
         rows.append(["", f"slope ({unit}/s)", *map(_slope, scores)])
     part = "" if task == "displacement" else f", phase {phase}"
-    title = f"Table {REGRESSION_TABLES[phase]}{part}: line through the trial (standard error)"
-    return TextTable(title, ["Pressure (kPa)", "Term", *who], rows, words=2)
+    return TextTable(
+        f"Table {REGRESSION_TABLES[phase]}{part}: line through the trial (standard error)",
+        ["Pressure (kPa)", "Term", *who],
+        rows,
+        words=2,
+    )
 
 
 def replay_table(errors: Sequence[ReplayError]) -> TextTable:
@@ -102,8 +112,7 @@ def replay_table(errors: Sequence[ReplayError]) -> TextTable:
     absolute = ["mean absolute", *(f"{means.absolute[name]:.3f}" for name in QUANTITIES)]
     phase = errors[0].phase
     part = "Displacement" if phase == "displacement" else f"Rotation, phase {phase}"
-    title = f"{part}: simulated less measured"
-    return TextTable(title, header, [*rows, RULE, signed, absolute])
+    return TextTable(f"{part}: simulated less measured", header, [*rows, RULE, signed, absolute])
 
 
 def _rmse_cells(score: PhaseScore | None) -> tuple[str, str]:

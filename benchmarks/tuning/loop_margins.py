@@ -101,15 +101,15 @@ class KeptRows:
     def __init__(self, out: Path, made_with: dict[str, Any]) -> None:
         self.path = out.with_name(f"{out.stem}.partial.json")
         # As JSON gives it back, so that the two can be compared.
-        provenance = made_with | {"commit": git_state(ROOT)["commit"]}
-        self.made_with = json.loads(json.dumps(provenance))
+        self.made_with = json.loads(json.dumps(made_with | {"commit": git_state(ROOT)["commit"]}))
         self.rows = self._read()
 
     def keep(self, row: Job, result: tuple[Gains, float]) -> None:
         """Add a row that is done, on disk too."""
         self.rows[name_of(row)] = result
-        document = {"made_with": self.made_with, "rows": self.rows}
-        write_text(self.path, json.dumps(document, indent=1) + "\n")
+        write_text(
+            self.path, json.dumps({"made_with": self.made_with, "rows": self.rows}, indent=1) + "\n"
+        )
 
     def forget(self) -> None:
         """Remove the file: the whole table is written."""

@@ -52,8 +52,7 @@ class ConstantPressure:
 
     def act(self, measurement: Measurement, time: float) -> float:
         """Regulator voltage (V)."""
-        share = min(time / CHANGE_S, 1.0)
-        return self._volts(self._first + share * (self.pressure - self._first))
+        return self._volts(self._first + min(time / CHANGE_S, 1.0) * (self.pressure - self._first))
 
 
 def nearest_pressure(station: StationInfo, exercise: "Exercise") -> float:

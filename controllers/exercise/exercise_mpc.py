@@ -225,5 +225,9 @@ def _horizon(station: StationInfo, length: float) -> Horizon:
 def _joint(station: StationInfo, fade: float) -> Joint:
     exercise = station.task.exercise
     assert exercise is not None
-    lag = station.model.parameters["regulator_lag"].time_constant
-    return Joint(*leg_of(station), lag, fade, exercise.population.typical.stiffness)
+    return Joint(
+        *leg_of(station),
+        station.model.parameters["regulator_lag"].time_constant,
+        fade,
+        exercise.population.typical.stiffness,
+    )

@@ -81,8 +81,7 @@ class LegObserver:
             process_noise.slack,
         )
         process = np.diag(np.square([0.0, *noise])) * station.period
-        fine = sensors["lvdt"].noise / self._radius
-        spread = np.square([sensors["potentiometer"].noise, fine])
+        spread = np.square([sensors["potentiometer"].noise, sensors["lvdt"].noise / self._radius])
         self._whole, self._push = _leg(station, process_noise.fade)
         self._seen = np.array([[1.0, 0.0, 0.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0, 1.0]])
         self._gain = settled_gain(self._whole, self._seen, process, np.diag(spread))

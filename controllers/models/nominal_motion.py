@@ -289,8 +289,7 @@ def nominal_motion(reference: Reference, station: StationInfo) -> NominalMotion:
     planned = delayed_start(_sampled(reference, station, parts), first)
     if len(jumps(planned, span)):
         planned = without_jumps(planned, first, step, stroke_along(planned, station), span)
-    volts = _voltages(inverse, _Aim(planned, station))
-    return NominalMotion(reference, station, planned, volts)
+    return NominalMotion(reference, station, planned, _voltages(inverse, _Aim(planned, station)))
 
 
 def _sampled(reference: Reference, station: StationInfo, parts: int) -> np.ndarray:
@@ -299,8 +298,7 @@ def _sampled(reference: Reference, station: StationInfo, parts: int) -> np.ndarr
     One that is the task's own at every control instant is taken as that, and asked for all times
     at once, a hundred times as fast as one by one.
     """
-    count = station.task.steps(1.0 / station.period) * parts + 1
-    times = np.arange(count) * station.period / parts
+    times = np.arange(station.task.steps(1.0 / station.period) * parts + 1) * station.period / parts
     own = np.asarray(station.task.schedule.reference(times))
     instants = [reference(time) for time in times[::parts].tolist()]
     if np.array_equal(own[::parts], instants):
@@ -335,8 +333,7 @@ def _voltages(inverse: Inverse, aim: _Aim) -> np.ndarray:
     parts = (len(planned) - 1) // len(volts)
     lag, _ = sensor_of(station, station.task.schedule.quantity)
     instants = station.period * np.arange(len(volts) + 1)
-    nodes = station.period / parts * np.arange(len(planned))
-    target = np.interp(instants - lag, nodes, planned)
+    target = np.interp(instants - lag, station.period / parts * np.arange(len(planned)), planned)
     volts = improved(station, volts, target, stroke_along(planned, station))
     volts.flags.writeable = False
     return volts

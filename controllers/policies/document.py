@@ -139,9 +139,13 @@ def _check_view_and_form(document: Mapping[str, Any]) -> None:
 
 
 def _check_rows(observation: list[Any], entries: int, curve: list[Any]) -> None:
-    rule = f"a list of {entries} [entry, what 1.0 stands for], as network.layers begins"
     pairs = len(observation) == entries and all(len(row) == 2 for row in observation)
-    _check(pairs, "observation", rule, observation)
+    _check(
+        pairs,
+        "observation",
+        f"a list of {entries} [entry, what 1.0 stands for], as network.layers begins",
+        observation,
+    )
     points = all(len(point) == 3 for point in curve)
     _check(points, "training.curve", "a list of [steps, seconds, error]", curve)
 

@@ -132,8 +132,11 @@ def say_lost(folder: Path, damaged: Sequence[str]) -> None:
     """Say once which records of a folder are damaged, if any are."""
     if damaged:
         more = f" and {len(damaged) - 1} more" if len(damaged) > 1 else ""
-        then = "those cases are computed anew, the others stay"
-        say_damaged(folder / "cases", f"{damaged[0]}{more}", then)
+        say_damaged(
+            folder / "cases",
+            f"{damaged[0]}{more}",
+            "those cases are computed anew, the others stay",
+        )
 
 
 def path_of(folder: Path, number: int) -> Path:

@@ -131,8 +131,11 @@ def _confusion(confusion: dict[str, dict[str, int]]) -> TextTable:
         [hidden, str(sum(said.values())), str(said.get(hidden, 0)), listed(_without(said, hidden))]
         for hidden, said in confusion.items()
     ]
-    header = ["hidden", "cases", "named so", "said otherwise"]
-    return TextTable("What was hidden, and what was said", header, rows)
+    return TextTable(
+        "What was hidden, and what was said",
+        ["hidden", "cases", "named so", "said otherwise"],
+        rows,
+    )
 
 
 def _without(said: dict[str, int], name: str) -> dict[str, int]:
@@ -171,8 +174,9 @@ def _by_kind(kinds: dict[str, Any]) -> TextTable:
 
 def _by_parameter_off(parameters: dict[str, Any]) -> TextTable:
     rows = [[name, percent(each["named"]), instead(each)] for name, each in parameters.items()]
-    header = ["off by a tenth", "named", "named where it was not, and was right"]
-    return TextTable("By parameter", header, rows)
+    return TextTable(
+        "By parameter", ["off by a tenth", "named", "named where it was not, and was right"], rows
+    )
 
 
 def _rounds(rounds: dict[str, Any]) -> TextTable:

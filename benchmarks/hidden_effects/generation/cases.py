@@ -295,8 +295,7 @@ def _measured(
     for i in range(4):
         memory = float(colours[i])
         start = [memory * float(g.standard_normal())]
-        keep = np.sqrt(1.0 - memory**2)
-        coloured, _ = lfilter([keep], [1.0, -memory], white[:, i], zi=start)
+        coloured, _ = lfilter([np.sqrt(1.0 - memory**2)], [1.0, -memory], white[:, i], zi=start)
         out[:, i] = clean[:, i] / UNITS[i] + rigs.NOISE[i] * levels[i] * (coloured + added[:, i])
     out[:, 0] += zero
     coarse = parameters.get("sensor_quantisation", {"signal": -1.0, "daq_steps": 1.0})

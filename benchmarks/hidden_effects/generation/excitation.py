@@ -56,10 +56,12 @@ def draw_trial(
 
 def volts(pressure: Array, load: Array) -> tuple[Array, Array]:
     """Motor and regulator voltages for pressures (Pa) and loads (N), by the lab's numbers."""
-    motor = (load - NOMINAL["drive_offset"]) / NOMINAL["drive_gain"]
-    regulator = (pressure - NOMINAL["regulator_offset"]) / NOMINAL["regulator_gain"]
     # What is logged, in whole millivolts, is what was sent.
-    return np.clip(np.round(motor, 3), 0.0, 10.0), np.clip(np.round(regulator, 3), 0.0, 10.0)
+    return np.clip(
+        np.round((load - NOMINAL["drive_offset"]) / NOMINAL["drive_gain"], 3), 0.0, 10.0
+    ), np.clip(
+        np.round((pressure - NOMINAL["regulator_offset"]) / NOMINAL["regulator_gain"], 3), 0.0, 10.0
+    )
 
 
 def _pressure(g: Generator, deep: bool = False) -> float:
@@ -224,8 +226,7 @@ def _one_pressure(g: Generator, time: Array) -> Asked:
     turns = [LOW_START_S + k * (SECONDS - 2.0 * LOW_START_S) / 4.0 for k in range(5)]
     fast = np.interp(time, turns, np.resize([low, high], 5))
     slow = low + (high - low) * (1.0 - np.abs(2.0 * _ramp(time) - 1.0))
-    step = np.where(time > 0.5 * SECONDS, high, low)
-    return [(still, fast), (still, slow), (still, step)]
+    return [(still, fast), (still, slow), (still, np.where(time > 0.5 * SECONDS, high, low))]
 
 
 LOW_EXCITATION: dict[str, Callable[[Generator, Array], Asked]] = {

@@ -131,8 +131,7 @@ class Rig:
     def experiment(self, motor: Array, regulator: Array) -> Experiment:
         """Commands on it, shape (trials, rows)."""
         commands = Commands(motor, regulator, np.arange(len(motor), dtype=float))
-        measured = np.ones(motor.shape, bool)
-        return Experiment(commands, measured, rigs.noise_levels(self.levels))
+        return Experiment(commands, np.ones(motor.shape, bool), rigs.noise_levels(self.levels))
 
 
 def draw_undecidable(seed: int, number: int, effect: str) -> Case:

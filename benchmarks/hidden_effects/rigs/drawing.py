@@ -52,8 +52,7 @@ def _by_position(rng: np.random.Generator, rig: AnyRig) -> HiddenEffect:
 
 def _by_pressure(rng: np.random.Generator, rig: AnyRig) -> HiddenEffect:
     assert isinstance(rig, ImposedRig)
-    slope = rng.uniform(0.5, 3.0) / max(rig.pressures)
-    return laws.PressureFriction(0.3 * rig.peak_force, slope)
+    return laws.PressureFriction(0.3 * rig.peak_force, rng.uniform(0.5, 3.0) / max(rig.pressures))
 
 
 def _cogging(rng: np.random.Generator, rig: AnyRig) -> HiddenEffect:
@@ -110,8 +109,9 @@ def _detent(rng: np.random.Generator, rig: AnyRig) -> HiddenEffect:
 
 def _brake(rng: np.random.Generator, rig: AnyRig) -> HiddenEffect:
     place, width = rng.uniform(-0.5, 0.5), rng.uniform(0.1, 0.2)
-    size = 1.5 * rig.peak_force / rig.peak_speed
-    return laws.EddyBrake(size, rig.travel * place, rig.travel * width)
+    return laws.EddyBrake(
+        1.5 * rig.peak_force / rig.peak_speed, rig.travel * place, rig.travel * width
+    )
 
 
 OUTSIDE: tuple[Offer, ...] = (Offer(_bumper), Offer(_detent), Offer(_brake))

@@ -225,13 +225,13 @@ class DrivenCampaign:
 
     def _mujoco_step(self) -> float:
         """Longest step whose errors the sensor does not tell (s)."""
-        acceleration = self.rig.peak_force / self.rig.inertia
-        return mujoco_axis.step_within(ERROR_SHARE * self.sensor.rms, acceleration)
+        return mujoco_axis.step_within(
+            ERROR_SHARE * self.sensor.rms, self.rig.peak_force / self.rig.inertia
+        )
 
     def _noise(self, i: int) -> np.ndarray:
         rng = np.random.default_rng((*self.seed, i, 7))
-        rows = np.arange(len(self.references[i].q))
-        return self.sensor.noise.draw(rng, rows / self.rig.rate)
+        return self.sensor.noise.draw(rng, np.arange(len(self.references[i].q)) / self.rig.rate)
 
 
 def draw_driven(

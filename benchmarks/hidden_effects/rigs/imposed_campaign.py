@@ -107,8 +107,7 @@ class ImposedCampaign:
         motion = -1e3 * self.motions[i].q
         table = {MOTION: (motion, files.digits(1e-6 * 1e3 * self.rig.travel))}
         if self.rig.area:
-            kpa = np.full(len(force), self.rig.pressures[i] / 1e3)
-            table["pressure_command_kpa"] = (kpa, 1)
+            table["pressure_command_kpa"] = (np.full(len(force), self.rig.pressures[i] / 1e3), 1)
         return table | {FORCE: (read, files.digits(self.cell.step))}
 
 

@@ -68,8 +68,7 @@ def draw_slide(rng: np.random.Generator, springs: bool) -> Rig:
     travel = log_uniform(rng, 0.5e-3, 0.5)
     mass = log_uniform(rng, 0.05, 200.0)
     frequency = _frequency(rng, travel, ACCELERATION, SPEED)
-    stiff = rng.random() < 0.4 and springs
-    return _drawn(rng, "slide", mass, travel, frequency, stiff, 0.0)
+    return _drawn(rng, "slide", mass, travel, frequency, rng.random() < 0.4 and springs, 0.0)
 
 
 def draw_joint(rng: np.random.Generator) -> Rig:

@@ -181,8 +181,9 @@ def _load(file_key: dict[str, Array]) -> _Slip | None:
         return None
     for unit, factor in (("kilonewtons", 1e3), ("millinewtons", 1e-3)):
         if 1 / _FACTOR < measured * factor / asked < _FACTOR:
-            seen = f"reaches {measured:.3g} N where {asks} about {asked:.3g} N"
-            return _Slip("load", seen, unit, factor)
+            return _Slip(
+                "load", f"reaches {measured:.3g} N where {asks} about {asked:.3g} N", unit, factor
+            )
     return None
 
 

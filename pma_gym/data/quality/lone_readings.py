@@ -110,8 +110,7 @@ def _lone(trials: Sequence[Trial], quantity: str) -> LoneReadings | None:
     known = np.concatenate([each[np.isfinite(each)] for each in apart.values()] or [np.empty(0)])
     if known.size < LEAST_ROWS:
         return None
-    squares = np.sort(known**2)[: int(USUAL * known.size)]
-    noise = float(np.sqrt(np.mean(squares) / USUAL_SQUARE))
+    noise = float(np.sqrt(np.mean(np.sort(known**2)[: int(USUAL * known.size)]) / USUAL_SQUARE))
     limit = max(ALONE * noise, STEPS * _step(trials, quantity))
     rows = {
         number: _alone(trials[number].measurements[quantity], each, limit, noise / SPREAD)
