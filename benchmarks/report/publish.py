@@ -1,7 +1,5 @@
 """`python -m benchmarks report`: writes a suite's leaderboard, as a page and as numbers."""
 
-import csv
-import io
 import shutil
 from collections.abc import Callable
 from functools import partial
@@ -9,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.executors.local import Background
-from benchmarks.files import write_bytes, write_text
+from benchmarks.files import csv_text, write_bytes, write_text
 from benchmarks.report.leaderboard import Leaderboard, read_leaderboard
 from benchmarks.report.page import (
     incomplete_counts,
@@ -172,12 +170,7 @@ def pairs_csv(leaderboard: Leaderboard) -> str:
 
 def _csv(header: list[str], rows: list[list[Any]]) -> str:
     """Rows as CSV; numbers with all digits, what is unknown empty."""
-    out = io.StringIO(newline="")
-    writer = csv.writer(out, lineterminator="\n")
-    writer.writerow(header)
-    for row in rows:
-        writer.writerow([_cell(value) for value in row])
-    return out.getvalue()
+    return csv_text([header, *(map(_cell, row) for row in rows)])
 
 
 def _cell(value: object) -> object:

@@ -5,7 +5,7 @@ Costs of tracking: start and steady errors, effort, limits, computing time.
 
 from collections.abc import Mapping, Sequence
 from itertools import combinations
-from typing import NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -20,53 +20,33 @@ MICROSECONDS = 1e6
 """Microseconds in a second."""
 
 
-class Spending(NamedTuple):
-    """Medians over the cases that a controller did not fail in; all NaN if it failed in all.
+def spending(record: SuiteRecord, measure: Measure, names: Sequence[str]) -> list[dict[str, Any]]:
+    """Return the costs of each controller in a measure's tasks.
 
-    Attributes:
-        name: of the controller.
-        cases: how many cases it has.
-        failures: how many of them failed.
-        start: RMSE of the first 0.5 s (the task's unit).
-        steady: RMSE of the rest.
-        largest: largest error of all phases.
-        effort_v: standard deviation of the voltage (V).
-        variation_v_per_s: total variation of the voltage (V/s).
-        saturated_percent: mean share of the control steps at 0 or 10 V (%).
-        clipped_percent: mean share of the control steps whose command, below 0 V or above 10 V,
-            was clipped (%).
-        clipped_v: how far beyond 0-10 V a command of any case was (V).
-        violating_percent: share of the cases that passed a soft limit (%).
-        violation_percent: the largest violation of any case (% of the way to the hard limit).
-        act_us: computing time of `act` (us).
-        act_us_worst: its 99th percentile (us).
-        real_time_factor: how often `act` fits into a control period, at that percentile.
+    Returns:
+        Medians over the cases that a controller did not fail in, all NaN if it failed in all:
+            name: of the controller.
+            cases: how many cases it has.
+            failures: how many of them failed.
+            start: RMSE of the first 0.5 s (the task's unit).
+            steady: RMSE of the rest.
+            largest: largest error of all phases.
+            effort_v: standard deviation of the voltage (V).
+            variation_v_per_s: total variation of the voltage (V/s).
+            saturated_percent: mean share of the control steps at 0 or 10 V (%).
+            clipped_percent: mean share of the control steps whose command, below 0 V or above 10 V,
+                was clipped (%).
+            clipped_v: how far beyond 0-10 V a command of any case was (V).
+            violating_percent: share of the cases that passed a soft limit (%).
+            violation_percent: the largest violation of any case (% of the way to the hard limit).
+            act_us: computing time of `act` (us).
+            act_us_worst: its 99th percentile (us).
+            real_time_factor: how often `act` fits into a control period, at that percentile.
     """
-
-    name: str
-    cases: int
-    failures: int
-    start: float
-    steady: float
-    largest: float
-    effort_v: float
-    variation_v_per_s: float
-    saturated_percent: float
-    clipped_percent: float
-    clipped_v: float
-    violating_percent: float
-    violation_percent: float
-    act_us: float
-    act_us_worst: float
-    real_time_factor: float
-
-
-def spending(record: SuiteRecord, measure: Measure, names: Sequence[str]) -> list[Spending]:
-    """Return the costs of each controller in a measure's tasks."""
     return [_of_one(record, measure, name) for name in names]
 
 
-def _of_one(record: SuiteRecord, measure: Measure, name: str) -> Spending:
+def _of_one(record: SuiteRecord, measure: Measure, name: str) -> dict[str, Any]:
     rows = [
         row
         for (who, episode), row in record.rows.items()
@@ -80,7 +60,7 @@ def _of_one(record: SuiteRecord, measure: Measure, name: str) -> Spending:
     largest = [max(phase["largest_error"] for phase in row["phases"].values()) for row in done]
     worst_us = float(np.median(column("act_us_worst")))
     period_us = MICROSECONDS / record.suite.control_rate_hz
-    return Spending(
+    return dict(
         name=name,
         cases=len(rows),
         failures=len(rows) - len(done),
@@ -209,7 +189,9 @@ def _ratio_cells(ratio: Interval | None) -> tuple[str, str]:
     return figure(ratio.estimate), ends(ratio)
 
 
-def spending_table(rows: Sequence[Spending], title: str, unit: str, labels: Labels) -> TextTable:
+def spending_table(
+    rows: Sequence[Mapping[str, Any]], title: str, unit: str, labels: Labels
+) -> TextTable:
     """Start and steady errors, effort, limits, computing time."""
     header = [
         "Controller",
@@ -230,16 +212,16 @@ def spending_table(rows: Sequence[Spending], title: str, unit: str, labels: Labe
     ]
     cells = [
         [
-            labels.get(row.name, row.name),
-            *map(figure, (row.start, row.steady, row.largest)),
-            *map(figure, (row.effort_v, row.variation_v_per_s)),
-            _short(row.saturated_percent),
-            _short(row.clipped_percent),
-            figure(row.clipped_v),
-            _short(row.violating_percent),
-            _short(row.violation_percent),
-            *map(figure, (row.act_us, row.act_us_worst, row.real_time_factor)),
-            f"{row.failures} of {row.cases}",
+            labels.get(row["name"], row["name"]),
+            *map(figure, (row["start"], row["steady"], row["largest"])),
+            *map(figure, (row["effort_v"], row["variation_v_per_s"])),
+            _short(row["saturated_percent"]),
+            _short(row["clipped_percent"]),
+            figure(row["clipped_v"]),
+            _short(row["violating_percent"]),
+            _short(row["violation_percent"]),
+            *map(figure, (row["act_us"], row["act_us_worst"], row["real_time_factor"])),
+            f"{row['failures']} of {row['cases']}",
         ]
         for row in rows
     ]

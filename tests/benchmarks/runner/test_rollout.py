@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from benchmarks.executors.executor import ThisProcess, local, run_all
-from benchmarks.reproduction.results import csv_text, scores_of
+from benchmarks.reproduction.results import scores_csv, scores_of
 from benchmarks.runner.controller_spec import ControllerError, ControllerSpec
 from benchmarks.runner.execution import execute, pending_cases
 from benchmarks.runner.journal import JOURNAL, case_rows
@@ -125,7 +125,7 @@ def test_an_array_of_one_volt_is_a_voltage():
 def test_any_number_of_processes_gives_the_same_bits(tmp_path):
     spec = controller_file(tmp_path, "return 2.0 - 10.0 * observation.extension")
     suite = small_suite(spec)
-    texts = [csv_text(scores(suite, tmp_path / str(jobs), local(jobs))) for jobs in (1, 2)]
+    texts = [scores_csv(scores(suite, tmp_path / str(jobs), local(jobs))) for jobs in (1, 2)]
     assert texts[0] == texts[1]
     assert texts[0].count("\n") == 3
 
