@@ -57,8 +57,7 @@ def hidden_effects(
         usual = (out or RESULTS / "hidden_effects") / f"{each.name}-{seed}"
         folder = usual if out is None or len(blocks) > 1 else out
         orders.append(Order(each, n, seed, folder, places, keep, recompute))
-    code = run_hidden_effects(orders, json_file)
-    raise typer.Exit(code)
+    raise typer.Exit(run_hidden_effects(orders, json_file))
 
 
 @app.command(

@@ -35,8 +35,7 @@ def speed(
     """Measure this package's speed beside other simulators' (`make peers` installs them)."""
     from benchmarks.speed.run import run_speed
 
-    code = run_speed(json_file, check, only, quick)
-    raise typer.Exit(code)
+    raise typer.Exit(run_speed(json_file, check, only, quick))
 
 
 @app.command(epilog="Example: python -m benchmarks remake --list")
@@ -83,8 +82,7 @@ def remake(
     if table:
         job.table()
         return
-    complete = job.go()
-    raise typer.Exit(0 if complete else 1)
+    raise typer.Exit(0 if job.go() else 1)
 
 
 @app.command(epilog="Example: python -m benchmarks tune --only '50hz*/rotation' --out gains.toml")

@@ -67,13 +67,15 @@ def _figure(standings: Standings, styles: Mapping[str, Style]) -> InteractiveFig
         )
         for name in errors.names
     ]
-    caption = (
-        f"{title}: every case. Hover for its station; click a controller to hide it, double-click "
-        "to see it alone; drag to zoom, double-click to zoom out."
-    )
     name = "cases-" + "-".join(errors.measure.name.split())
     return InteractiveFigure(
-        name, caption, "pressure (kPa)", f"RMSE ({errors.measure.unit})", traces, logarithmic=True
+        name,
+        f"{title}: every case. Hover for its station; click a controller to hide it, double-click "
+        "to see it alone; drag to zoom, double-click to zoom out.",
+        "pressure (kPa)",
+        f"RMSE ({errors.measure.unit})",
+        traces,
+        logarithmic=True,
     )
 
 

@@ -170,15 +170,19 @@ def pair_table(standings: Standings, labels: Labels) -> TextTable:
             f"{better.improvement.estimate * cases:g} of {cases}",
         ]
         rows.append([*cells, "**yes**" if better.separated else "no"])
-    header = [
-        "A",
-        "B",
-        "Error of B over that of A | ratio",
-        "Error of B over that of A | 95 % interval",
-        "A's is smaller (cases)",
-        "Differ",
-    ]
-    return TextTable(f"{capital(standings.errors.measure.name)}: pairs", header, rows, words=2)
+    return TextTable(
+        f"{capital(standings.errors.measure.name)}: pairs",
+        [
+            "A",
+            "B",
+            "Error of B over that of A | ratio",
+            "Error of B over that of A | 95 % interval",
+            "A's is smaller (cases)",
+            "Differ",
+        ],
+        rows,
+        words=2,
+    )
 
 
 def _ratio_cells(ratio: Interval | None) -> tuple[str, str]:

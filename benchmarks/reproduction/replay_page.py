@@ -133,12 +133,11 @@ def _against_simple_prediction(results: Results, errors: Sequence[ReplayError]) 
         ]
         for name, unit in _UNITS.items()
     ]
-    title = (
-        f"Displacement, {means.trials} trials, beside the simple prediction "
-        "(table I3 read at the printed voltages, lagged by 2.90/K)"
-    )
     return TextTable(
-        title, ["", "Mean error", "Mean absolute error", "Simple prediction", "Difference"], rows
+        f"Displacement, {means.trials} trials, beside the simple prediction "
+        "(table I3 read at the printed voltages, lagged by 2.90/K)",
+        ["", "Mean error", "Mean absolute error", "Simple prediction", "Difference"],
+        rows,
     )
 
 

@@ -117,8 +117,7 @@ def run_tune(
         done = sum(name_of(row) in kept.rows for row in rows)
         print(_interrupted(done, len(rows), kept.path, out), file=sys.stderr)
         return False
-    tables = _tables(rows, [kept.rows[name_of(row)] for row in rows])
-    for loop, kinds in tables.items():
+    for loop, kinds in _tables(rows, [kept.rows[name_of(row)] for row in rows]).items():
         for kind, controllers in kinds.items():
             table = {"provenance": _provenance(known, seed)} | controllers
             document.setdefault(known.name, {}).setdefault(loop, {})[kind] = table

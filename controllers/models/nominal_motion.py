@@ -300,8 +300,7 @@ def _sampled(reference: Reference, station: StationInfo, parts: int) -> np.ndarr
     """
     times = np.arange(station.task.steps(1.0 / station.period) * parts + 1) * station.period / parts
     own = np.asarray(station.task.schedule.reference(times))
-    instants = [reference(time) for time in times[::parts].tolist()]
-    if np.array_equal(own[::parts], instants):
+    if np.array_equal(own[::parts], [reference(time) for time in times[::parts].tolist()]):
         return own
     return np.array([reference(time) for time in times.tolist()])
 

@@ -114,8 +114,7 @@ def _fix_backward(time: Array, back: NDArray[np.intp], place: Place) -> str:
     jumps = float(np.sum(excess[0]) - np.sum(excess[1]))
     if even or (ordered.min() > 0 and 0.5 < jumps / float(np.sum(missing)) < 2.0):
         return _SORT
-    copied = [np.isin(time[i : _next(time, i)], time[:i]).all() for i in back]
-    if all(copied):
+    if all([np.isin(time[i : _next(time, i)], time[:i]).all() for i in back]):
         return (
             f"from {where} on, rows have times of rows before them: remove one copy where both "
             "hold the same readings"

@@ -275,8 +275,7 @@ def _beyond_fix(source: Source, theirs: NDArray[np.float64], values: NDArray[np.
     )
     clip = f"log what reached the drive, or clip to it: {line}{kept}limit = [{low:g}, {high:g}] }}"
     reach = float(np.max(np.abs(values[there]))) / high
-    counts = bool(np.all(theirs[there] == np.rint(theirs[there]))) and reach > _FAR_BEYOND
-    if counts:
+    if bool(np.all(theirs[there] == np.rint(theirs[there]))) and reach > _FAR_BEYOND:
         return f"the log looks like raw DAQ counts: {factor}"
     if column.kind != "command":
         return f"if the log is in another unit, {factor}; else correct the reading"

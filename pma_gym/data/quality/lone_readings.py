@@ -82,8 +82,7 @@ class LoneReadings:
 def without_lone_readings(trials: Sequence[Trial]) -> tuple[list[Trial], list[str]]:
     """Return the trials without isolated outliers, and a message for each signal with some."""
     kept, messages = list(trials), []
-    names = dict.fromkeys(name for trial in trials for name in trial.measurements)
-    for quantity in names:
+    for quantity in dict.fromkeys(name for trial in trials for name in trial.measurements):
         lone = _lone(trials, quantity)
         if lone is None:
             continue
