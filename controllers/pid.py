@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     import control
 from typing import Protocol
 
-from controllers.improved_feedforward import ImprovedFeedforward
+from controllers.serres_feedforward import ImprovedFeedforward
 
 
 class PID:

@@ -76,7 +76,7 @@ class LinearController(Controller, Protocol):
 ENTRY_POINTS = {
     "serres_replay": "controllers.serres_feedforward:SerresReplay",
     "serres_feedforward": "controllers.serres_feedforward:SerresFeedforward",
-    "improved_feedforward": "controllers.improved_feedforward:ImprovedFeedforward",
+    "improved_feedforward": "controllers.serres_feedforward:ImprovedFeedforward",
     "pid": "controllers.pid:PID",
     "feedforward_pid": "controllers.pid:FeedforwardPID",
     "lqg": "controllers.lqg:LQG",
@@ -87,7 +87,7 @@ ENTRY_POINTS = {
     "ppo": "controllers.policy:PPOPolicy",
     "ppo_ilc": "controllers.policy_with_ilc:PolicyWithILC",
     "oracle": "controllers.oracle:Oracle",
-    "constant_pressure": "controllers.exercise.constant_pressure:ConstantPressure",
+    "constant_pressure": "controllers.exercise.moment_pid:ConstantPressure",
     "scheduled_pressure": "controllers.exercise.moment_pid:ScheduledPressure",
     "speed_pid": "controllers.exercise.speed_pid:SpeedPID",
     "moment_pid": "controllers.exercise.moment_pid:MomentPID",

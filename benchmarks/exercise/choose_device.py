@@ -11,10 +11,10 @@ from pathlib import Path
 from rich.console import Console
 
 from benchmarks.dissertation import write_csv
-from benchmarks.exercise.plots import exercise_plot
 from benchmarks.exercise.profile import Answer, Prescription, answer
 from benchmarks.exercise.tables import (
     check_table,
+    exercise_plot,
     knee_table,
     makers_table,
     range_table,

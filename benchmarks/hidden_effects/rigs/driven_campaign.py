@@ -8,10 +8,16 @@ from typing import Any
 import numpy as np
 
 from benchmarks.hidden_effects.rigs import effect_size, files
-from benchmarks.hidden_effects.rigs.excitation import Reference, draw_lengths, draw_reference
 from benchmarks.hidden_effects.rigs.files import draw_names
 from benchmarks.hidden_effects.rigs.laws import HiddenEffect
-from benchmarks.hidden_effects.rigs.rig import Rig, draw_joint, draw_slide
+from benchmarks.hidden_effects.rigs.rig import (
+    Reference,
+    Rig,
+    draw_joint,
+    draw_lengths,
+    draw_reference,
+    draw_slide,
+)
 from benchmarks.hidden_effects.rigs.sensing import Sensed, Sensor, draw_sensor
 from benchmarks.hidden_effects.rigs.simulators import mujoco_axis, stick_slip
 from benchmarks.hidden_effects.rigs.simulators.drive import Transmission

@@ -8,9 +8,15 @@ import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
 from benchmarks.hidden_effects.rigs import files
-from benchmarks.hidden_effects.rigs.excitation import Reference, draw_lengths, draw_reference
 from benchmarks.hidden_effects.rigs.laws import Backlash, HiddenEffect
-from benchmarks.hidden_effects.rigs.rig import ImposedRig, draw_imposed, log_uniform
+from benchmarks.hidden_effects.rigs.rig import (
+    ImposedRig,
+    Reference,
+    draw_imposed,
+    draw_lengths,
+    draw_reference,
+    log_uniform,
+)
 from benchmarks.hidden_effects.rigs.sensing import Sensor, draw_noise
 from benchmarks.hidden_effects.rigs.simulators import imposed_force, mujoco_force
 
