@@ -105,12 +105,9 @@ def write(record: CaseRecord, folder: Path) -> None:
     write_text(path_of(folder, record.number), text)
 
 
-def read(folder: Path, count: int | None = None) -> list[CaseRecord]:
-    """Records of a folder, cases 1 to `count`, all if not given, by number."""
-    if count is None:
-        paths = sorted((folder / "cases").glob("case_*.json"))
-    else:
-        paths = [path_of(folder, number) for number in range(1, count + 1)]
+def read(folder: Path, count: int) -> list[CaseRecord]:
+    """Records of a folder, of cases 1 to `count`, by number."""
+    paths = [path_of(folder, number) for number in range(1, count + 1)]
     records, damaged = list[CaseRecord](), list[str]()
     for path in paths:
         if not path.is_file():

@@ -21,7 +21,7 @@ from benchmarks.hidden_effects.evaluation.targets import (
     SIZE_ERROR,
     Target,
 )
-from benchmarks.hidden_effects.evaluation.verdicts import Outcome, compare, judged, unanswered
+from benchmarks.hidden_effects.evaluation.verdicts import Outcome, compare, judged, no_answer
 from pma_gym.pages.figures import legend_below, picture, png
 
 Z = 1.959964
@@ -37,10 +37,8 @@ LEAST_ROUNDS = 2
 
 def outcome_of(record: CaseRecord) -> Outcome:
     """The outcome of a case that the job kept."""
-    if record.answer is None:
-        outcome = unanswered(record.truth, record.message)
-    else:
-        outcome = compare(record.truth, record.answer)
+    answer = no_answer(record.message) if record.answer is None else record.answer
+    outcome = compare(record.truth, answer)
     outcome.number = record.number
     outcome.rounds = {
         chooser: [{**each, **judged(each["said"], outcome.truth)} for each in rounds]

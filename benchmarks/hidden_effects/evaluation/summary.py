@@ -108,22 +108,18 @@ def _own(figures: dict[str, Any]) -> list[Block]:
     if seconds["median"] is not None:
         text += f" A diagnosis took {seconds['median']:.1f} s (median), {seconds['most']:.1f} s"
         text += " at most."
-    blocks: list[Block] = [Paragraph(text), _confusion(figures["confusion"])]
-    if figures["by_effect"]:
-        blocks.append(_by_effect(figures["by_effect"]))
-    if len(figures["by_size"]) > 1:
-        blocks.append(_by_size(figures["by_size"]))
-    if figures["sizes"]["by_parameter"]:
-        blocks.append(_sizes(figures["sizes"]["by_parameter"]))
-    if figures["by_kind"]:
-        blocks.append(_by_kind(figures["by_kind"]))
-    if figures["by_parameter_off"]:
-        blocks.append(_by_parameter_off(figures["by_parameter_off"]))
-    if "proposed" in figures["rounds"]:
-        blocks.append(_rounds(figures["rounds"]))
-    if figures["misses"]:
-        blocks.append(_misses(figures["misses"]))
-    return blocks
+    rounds = figures["rounds"] if "proposed" in figures["rounds"] else {}
+    tables: list[tuple[Any, Any]] = [
+        (figures["by_effect"], _by_effect),
+        (figures["by_size"] if len(figures["by_size"]) > 1 else [], _by_size),
+        (figures["sizes"]["by_parameter"], _sizes),
+        (figures["by_kind"], _by_kind),
+        (figures["by_parameter_off"], _by_parameter_off),
+        (rounds, _rounds),
+        (figures["misses"], _misses),
+    ]
+    shown = [table(some) for some, table in tables if some]
+    return [Paragraph(text), _confusion(figures["confusion"]), *shown]
 
 
 def _confusion(confusion: dict[str, dict[str, int]]) -> TextTable:
