@@ -11,7 +11,7 @@ from benchmarks.commands.options import (
     Jobs,
     app,
 )
-from benchmarks.executors.executor import executor_named
+from benchmarks.executors.choice import executor_named
 from benchmarks.files import RESULTS
 
 

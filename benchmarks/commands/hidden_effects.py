@@ -14,7 +14,7 @@ from benchmarks.commands.options import (
     require_writable,
     writable_out,
 )
-from benchmarks.executors.executor import executor_named
+from benchmarks.executors.choice import executor_named
 from benchmarks.files import RESULTS
 
 

@@ -8,7 +8,8 @@ from typing import Annotated, Any, NoReturn
 
 import typer
 
-from benchmarks.executors.executor import ExecutorMissing, ExecutorName
+from benchmarks.executors.choice import ExecutorName
+from benchmarks.executors.executor import ExecutorMissing
 from pma_gym.cli.options import StrictTyper
 
 INTERRUPTED = 130

@@ -12,7 +12,8 @@ from benchmarks.commands.options import (
     app,
     listed,
 )
-from benchmarks.executors.executor import Executor, executor_named
+from benchmarks.executors.choice import executor_named
+from benchmarks.executors.executor import Executor
 from benchmarks.files import RESULTS
 from pma_gym.cli.options import JsonOption
 from pma_gym.cli.terminal import print_json, print_table
@@ -114,7 +115,7 @@ def report(
     ] = False,
 ) -> None:
     """Write a suite's page, its leaderboard, from the journal of its run."""
-    from benchmarks.executors.executor import local
+    from benchmarks.executors.choice import local
     from benchmarks.report.leaderboard import run_command
     from benchmarks.report.publish import run_report
     from benchmarks.reproduction.reproduce import report_again

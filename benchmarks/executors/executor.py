@@ -2,15 +2,12 @@
 
 A piece of work and its result travel between processes as bytes; where a process died or took too
 long, an exception stands for the result.
-
-Executors by the names that commands know.
 """
 
 import pickle
 import signal
 import traceback
 from collections.abc import Callable, Mapping, Sequence
-from enum import StrEnum
 from typing import Any, Protocol
 
 
@@ -226,36 +223,3 @@ def _run_elsewhere(
     executor.run(packed, first, alone=False)
     # Alone it has all of the memory, if that was the reason.
     executor.run({index: packed[index] for index in sorted(died)}, second, alone=True)
-
-
-class ExecutorName(StrEnum):
-    """Values of `--executor`."""
-
-    LOCAL = "local"
-    RAY = "ray"
-
-
-def executor_named(name: ExecutorName, jobs: int) -> Executor:
-    """The executor of a name.
-
-    Raises:
-        ExecutorMissing: its library is not installed.
-    """
-    if name is ExecutorName.RAY:
-        from benchmarks.executors.ray_cluster import RayCluster
-
-        return RayCluster(jobs)
-    return local(jobs)
-
-
-def local(jobs: int) -> Executor:
-    """This process for one job at a time, processes of this machine for more.
-
-    Raises:
-        ExecutorMissing: pebble is not installed.
-    """
-    if jobs == 1:
-        return ThisProcess()
-    from benchmarks.executors.local import LocalProcesses
-
-    return LocalProcesses(jobs)

@@ -11,7 +11,8 @@ from rich.console import Console
 from rich.progress import Progress
 from rich.table import Table
 
-from benchmarks.executors.executor import local, run_or_raise
+from benchmarks.executors.choice import local
+from benchmarks.executors.executor import run_or_raise
 from benchmarks.files import write_text
 from benchmarks.identification import statics, station
 from benchmarks.identification.creep import STUDENT_10, CreepFold, decided, load_cycle_with_creep

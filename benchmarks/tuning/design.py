@@ -34,7 +34,8 @@ from rich.progress import Progress
 from scipy.optimize import minimize
 from scipy.stats.qmc import LatinHypercube, scale
 
-from benchmarks.executors.executor import local, run_all
+from benchmarks.executors.choice import local
+from benchmarks.executors.executor import run_all
 from benchmarks.files import toml_document, write_text
 from benchmarks.runner.rollout import Rollout, rollout
 from benchmarks.suites.frozen import frozen_suite

@@ -40,7 +40,8 @@ import numpy as np
 from rich.progress import Progress
 from scipy.optimize import minimize
 
-from benchmarks.executors.executor import ProcessDied, local, run_all
+from benchmarks.executors.choice import local
+from benchmarks.executors.executor import ProcessDied, run_all
 from benchmarks.files import toml_document, write_text
 from benchmarks.tuning.cost import Cost, chosen
 from benchmarks.tuning.loop_margins import Job, KeptRows, lambda_tuning, name_of

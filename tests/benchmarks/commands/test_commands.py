@@ -7,7 +7,7 @@ from rich.console import Console
 from typer.testing import CliRunner
 
 from benchmarks.__main__ import app
-from benchmarks.executors.executor import local
+from benchmarks.executors.choice import local
 from benchmarks.reproduction import reproduce
 from benchmarks.runner import run
 from benchmarks.suites.frozen import load_suite

@@ -19,7 +19,8 @@ from benchmarks.__main__ import app
 from benchmarks.comparison.add import SCORES, TIMES
 from benchmarks.comparison.compare import compare
 from benchmarks.comparison.job import chosen, run_comparison
-from benchmarks.executors.executor import ExecutorName, ProcessDied, ThisProcess, executor_named
+from benchmarks.executors.choice import ExecutorName, executor_named
+from benchmarks.executors.executor import ProcessDied, ThisProcess
 from benchmarks.runner import fingerprint, provenance
 from benchmarks.runner.case import cases, failed_row
 from benchmarks.runner.execution import execute, pending_cases

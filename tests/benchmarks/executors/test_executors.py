@@ -12,13 +12,11 @@ from pathlib import Path
 
 import pytest
 
+from benchmarks.executors.choice import ExecutorName, executor_named, local
 from benchmarks.executors.executor import (
-    ExecutorName,
     ProcessDied,
     ThisProcess,
     TookTooLong,
-    executor_named,
-    local,
     run_all,
     run_or_raise,
 )

@@ -8,7 +8,8 @@ from rich.console import Console
 from typer.testing import CliRunner
 
 from benchmarks.__main__ import app
-from benchmarks.executors.executor import ThisProcess, local
+from benchmarks.executors.choice import local
+from benchmarks.executors.executor import ThisProcess
 from benchmarks.exercise.safety_episodes import (
     KINDS,
     PUMPING,

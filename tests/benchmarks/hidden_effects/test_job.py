@@ -9,7 +9,7 @@ import pytest
 from typer.testing import CliRunner
 
 from benchmarks.__main__ import app
-from benchmarks.executors.executor import local
+from benchmarks.executors.choice import local
 from benchmarks.hidden_effects import run_blocks
 from benchmarks.hidden_effects.evaluation import scoring
 from benchmarks.hidden_effects.evaluation.records import measured_text, method_digest

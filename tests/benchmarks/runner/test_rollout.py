@@ -10,7 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.executors.executor import ThisProcess, local, run_all
+from benchmarks.executors.choice import local
+from benchmarks.executors.executor import ThisProcess, run_all
 from benchmarks.reproduction.results import scores_csv, scores_of
 from benchmarks.runner.controller_spec import ControllerError, ControllerSpec
 from benchmarks.runner.execution import execute, pending_cases
