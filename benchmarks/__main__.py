@@ -3,27 +3,17 @@
 import os
 import sys
 
-from benchmarks.commands import dissertation, exercise, hidden_effects, runs, settings, training
-from pma_gym.cli.options import StrictTyper
+# In the order in which --help lists the commands.
+# isort: off
+from benchmarks.commands import runs, dissertation, settings, hidden_effects, training, exercise  # noqa: F401
+
+# isort: on
+from benchmarks.commands.options import app
 from pma_gym.terminal import safe_streams
 
 # Figures are drawn to files; each process computes on its own core.
 os.environ.setdefault("MPLBACKEND", "Agg")
 os.environ.setdefault("OMP_NUM_THREADS", "1")
-
-app = StrictTyper(
-    add_completion=False,
-    pretty_exceptions_enable=False,
-    rich_markup_mode=None,
-    invoke_without_command=True,
-)
-# In the order in which --help lists the commands.
-runs.register(app)
-dissertation.register(app)
-settings.register(app)
-hidden_effects.register(app)
-training.register(app)
-exercise.register(app)
 
 
 def main() -> None:

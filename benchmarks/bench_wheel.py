@@ -36,8 +36,7 @@ def renamed_source(text: str) -> str:
     >>> print(renamed_source('controllers = {"controllers": 1}'))
     controllers = {"controllers": 1}
     """
-    used = {match[1] for match in _BARE.finditer(text)}
-    text = "".join(_renamed_tokens(text, used))
+    text = "".join(_renamed_tokens(text, {match[1] for match in _BARE.finditer(text)}))
     return _IMPORT.sub(lambda match: match[1] + NAMES[match[2]], text)
 
 

@@ -4,8 +4,6 @@
 tables, `voltages` writes a feed-forward's voltages for a real rig.
 """
 
-import csv
-import io
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -15,7 +13,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from benchmarks.files import write_text
+from benchmarks.files import csv_text, write_text
 from controllers import CONTROLLERS
 from pma_gym.data.serres2008 import load_table
 from pma_gym.envs import PMAEnv
@@ -66,17 +64,14 @@ def run_voltages(order: Order, out: Path) -> int:
     environment = _environment(order)
     rows = list(_rows(order, environment))
     unit = environment.task.schedule.unit
-    text = io.StringIO()
-    text.write(
+    comment = (
         f"# {order.controller}, {order.task}, {order.pressure_kpa:g} kPa, {order.rate_hz:g} Hz, "
         f"model {environment.nominal_plant.model.name}\n"
         "# Settle at the first row; hold each row until the next "
         "(pma-gym simulate --interpolation zoh)\n"
     )
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(("time_s", "motor_voltage_v", "regulator_voltage_v", f"reference_{unit}"))
-    writer.writerows(rows)
-    write_text(out, text.getvalue())
+    header = ("time_s", "motor_voltage_v", "regulator_voltage_v", f"reference_{unit}")
+    write_text(out, comment + csv_text([header, *rows]))
     return len(rows)
 
 
@@ -187,11 +182,7 @@ def write_csv(out: Path, columns: tuple[str, ...], rows: list[tuple[str, ...]]) 
         columns: header.
         rows: cells as text.
     """
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(columns)
-    writer.writerows(rows)
-    write_text(out, text.getvalue())
+    write_text(out, csv_text([columns, *rows]))
 
 
 COLUMNS = ("study", "table", "quantity", "printed", "recomputed", "verdict", "note")

@@ -3,10 +3,12 @@
 Damaged files of results: their contents are recomputed, with one warning.
 """
 
+import csv
+import io
 import json
 import re
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -33,6 +35,13 @@ def write_bytes(path: Path, content: bytes) -> None:
 def write_text(path: Path, text: str) -> None:
     """As `write_bytes`, for text in UTF-8; bytes of file names that are none become escapes."""
     write_bytes(path, text.encode("utf-8", "backslashreplace"))
+
+
+def csv_text(rows: Iterable[Iterable[object]]) -> str:
+    """Rows, the header first, as a CSV file has them."""
+    out = io.StringIO(newline="")
+    csv.writer(out, lineterminator="\n").writerows(rows)
+    return out.getvalue()
 
 
 def toml_document(comment: str, schema: int, tables: Mapping[str, Any]) -> str:

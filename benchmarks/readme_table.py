@@ -114,9 +114,19 @@ def replay(run: Run) -> str:
             values = [[error[column] for error in errors] for column in _REPLAY_COLUMNS]
             cells = [f"{fmean(v):+.2f} ({fmean(map(abs, v)):.2f})" for v in values]
             rows.append([f"{name} ({UNITS[task]})", *cells])
-    header = ["Simulated less measured", "slope (per s)", "intercept", "mean position", "RMSE"]
-    header += ["line part", "scatter"]
-    return _table(header, rows, words=1)
+    return _table(
+        [
+            "Simulated less measured",
+            "slope (per s)",
+            "intercept",
+            "mean position",
+            "RMSE",
+            "line part",
+            "scatter",
+        ],
+        rows,
+        words=1,
+    )
 
 
 def parts(run: Run) -> str:
@@ -132,8 +142,10 @@ def parts(run: Run) -> str:
                 cells += [f"{fmean(one[part] for one in every):.2f}" for part in _PARTS]
             name = task if task == phase else f"{task}, phase {phase}"
             rows.append([f"{name} ({UNITS[task]})", *cells])
-    header = ["Mean over the trials"]
-    header += [f"{who}: {part}" for who in ("measured", "simulated") for part in _PART_NAMES]
+    header = [
+        "Mean over the trials",
+        *(f"{who}: {part}" for who in ("measured", "simulated") for part in _PART_NAMES),
+    ]
     return _table(header, rows, words=1)
 
 
@@ -151,9 +163,18 @@ def reading(run: Run) -> str:
     every = run["rotation_reading"]
     whole = [fmean(abs(e[who] - e["measured"]) for e in every) for who in ("plain", "read")]
     rows.append(["all", "", "", "", *(f"{value:.2f}" for value in whole)])
-    header = ["Table 30, RMSE (deg)", "measured", "replay", "replay as it may have been read"]
-    header += ["mean absolute error: replay", "as read"]
-    return _table(header, rows, words=1)
+    return _table(
+        [
+            "Table 30, RMSE (deg)",
+            "measured",
+            "replay",
+            "replay as it may have been read",
+            "mean absolute error: replay",
+            "as read",
+        ],
+        rows,
+        words=1,
+    )
 
 
 def bound(run: Run) -> str:

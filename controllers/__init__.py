@@ -1,23 +1,18 @@
 """Controllers of the benchmark, one a file; `CONTROLLERS` lists them by name."""
 
 from controllers.adrc import ADRC
-from controllers.exercise.constant_pressure import ConstantPressure
 from controllers.exercise.exercise_mpc import ExerciseMPC
-from controllers.exercise.moment_pid import MomentPID
-from controllers.exercise.scheduled_pressure import ScheduledPressure
+from controllers.exercise.moment_pid import ConstantPressure, MomentPID, ScheduledPressure
 from controllers.exercise.speed_pid import SpeedPID
-from controllers.feedforward_pid import FeedforwardPID
 from controllers.ilc import ILC
-from controllers.improved_feedforward import ImprovedFeedforward
 from controllers.lqg import LQG
 from controllers.mpc import PreviewMPC
 from controllers.oracle import Oracle
-from controllers.pid import PID
+from controllers.pid import PID, FeedforwardPID
 from controllers.policy import Policy, PPOPolicy, ShippedPolicy
 from controllers.policy_with_ilc import PolicyWithILC
 from controllers.registry import CONTROLLERS, Controller, Reference
-from controllers.serres_feedforward import SerresFeedforward
-from controllers.serres_replay import SerresReplay
+from controllers.serres_feedforward import ImprovedFeedforward, SerresFeedforward, SerresReplay
 from controllers.sliding_mode import SlidingMode
 
 __all__ = [

@@ -30,9 +30,9 @@ from scipy.ndimage import binary_opening
 from scipy.sparse.linalg import spsolve
 
 from controllers.design.designs import designed, scheduled_gains
-from controllers.feedforward_pid import FeedforwardPID
 from controllers.models.nominal_motion import NominalMotion, nominal_motion
 from controllers.observers.extended_state_observer import LOOSE_N
+from controllers.pid import FeedforwardPID
 from controllers.registry import Reference
 from pma_gym.envs import Measurement, StationInfo
 
@@ -224,8 +224,7 @@ class ILC:
     def act(self, measurement: Measurement, time: float) -> float:
         """Voltage (V) of the task's actuator to hold for the next control period."""
         voltage = self._pid.act(measurement, time)
-        expected = self._motion.expected(time - self._late)
-        self._errors.append(expected - self._position(measurement))
+        self._errors.append(self._motion.expected(time - self._late) - self._position(measurement))
         self._added.append(voltage - self._pid.feedforward(time))
         self._taut.append(measurement.load >= self._loose)
         return voltage
@@ -240,10 +239,8 @@ class ILC:
             return
         # A voltage sent in step k shows in the errors from step k + late + 1 on.
         plant = LiftedModel(motion, late, count)
-        errors = np.array(self._errors[late:])
-        without = errors + plant.response(np.array(self._added[:count]))
-        taut = tight(self._taut[late:])
-        change = plant.change(without, taut, self.settings.cutoff)
+        without = np.array(self._errors[late:]) + plant.response(np.array(self._added[:count]))
+        change = plant.change(without, tight(self._taut[late:]), self.settings.cutoff)
         smooth = 2.0 * self.settings.cutoff * station.period
         power = float(np.mean(plant.response(change) ** 2)) / (smooth * motion.noise**2)
         # The voltages are kept by the period that they are in force in.

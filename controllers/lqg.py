@@ -126,8 +126,9 @@ class LQG:
             a[:, 0] = free[0]
             turns = station.task.exercise is None and station.task.schedule.followed.is_angle
             lengths = 1.0 if turns else station.model.parameters["rotor"].radius
-            weight = lengths / self._stroke.models[0].gain
-            self._free_gains = regulator(a, free[1], weight, settings.effort)
+            self._free_gains = regulator(
+                a, free[1], lengths / self._stroke.models[0].gain, settings.effort
+            )
 
     def _settings(self, station: StationInfo) -> Settings:
         return self._fixed_settings or designed(self.name, station, DEFAULTS)
@@ -144,8 +145,7 @@ class LQG:
         else:
             feedback = self._of_muscle(state, due)
         self._behind = float(state[0])
-        nominal = self._motion.voltage(due * self._period)
-        voltage = min(max(nominal + feedback, 0.0), VOLTAGE_LIMIT)
+        voltage = min(max(self._motion.voltage(due * self._period) + feedback, 0.0), VOLTAGE_LIMIT)
         estimator.send(voltage)
         return voltage
 
@@ -230,8 +230,7 @@ def steady_gain(local: LocalModel, unknowns: Unknowns, noise: float, period: flo
     whole, push = with_disturbance(local)
     driven = unknowns.process_noise**2 * np.outer(push, push)
     driven[-1, -1] += unknowns.disturbance**2 * period
-    seen = np.eye(len(push))[:, :1]
-    spread = solve_discrete_are(whole.T, seen, driven, np.array([[noise**2]]))
+    spread = solve_discrete_are(whole.T, np.eye(len(push))[:, :1], driven, np.array([[noise**2]]))
     return spread[:, 0] / (spread[0, 0] + noise**2)
 
 

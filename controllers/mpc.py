@@ -192,6 +192,5 @@ class _Trial:
 @lru_cache(maxsize=DESIGNS_KEPT)
 def _designed(trial: _Trial) -> BankDesign:
     station, settings = trial.station, trial.settings
-    beyond = trial.horizon + trial.delay
-    motion = linear_motion(trial.needed, trial.target, station, beyond)
+    motion = linear_motion(trial.needed, trial.target, station, trial.horizon + trial.delay)
     return bank_design(motion, station, trial.horizon, settings.wander, settings.jolt)

@@ -86,10 +86,8 @@ def horizon(period: float, delay: int) -> Horizon:
     periods = np.repeat(np.arange(len(counts)), counts)
     own = np.arange(len(periods)) - np.repeat(np.cumsum(counts) - counts, counts) + 1
     ends = (periods - delay) * parts + np.round(own * parts / counts[periods]).astype(int)
-    samples = np.diff(ends, prepend=-delay * parts)
-    weights = np.where(periods < delay, 0.0, np.sqrt(samples))
-    blocks = np.repeat(np.arange(len(lengths)), lengths)
-    return Horizon(parts, blocks, periods, ends, weights)
+    weights = np.where(periods < delay, 0.0, np.sqrt(np.diff(ends, prepend=-delay * parts)))
+    return Horizon(parts, np.repeat(np.arange(len(lengths)), lengths), periods, ends, weights)
 
 
 def block_lengths(period: float) -> list[int]:

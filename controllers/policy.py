@@ -54,14 +54,17 @@ class Policy:
                 "at another rate or delay it runs as Policy(path, anywhere=True)"
             )
         made_for = str(self.file.environment["kwargs"].get("model", "station"))
-        fix = "train one on it: python -m benchmarks train"
-        warn_of_other_plant(station, f"the weights of policy {self.name}", made_for, fix)
+        warn_of_other_plant(
+            station,
+            f"the weights of policy {self.name}",
+            made_for,
+            "train one on it: python -m benchmarks train",
+        )
         self._adapter.reset(reference, station)
 
     def act(self, measurement: Measurement, time: float) -> float:
         """Voltage (V, 0-10) to hold for the next control period."""
-        entries = self._adapter.update(measurement, time)
-        return self._adapter.volts(float(self._network(entries)[0]))
+        return self._adapter.volts(float(self._network(self._adapter.update(measurement, time))[0]))
 
 
 class ShippedPolicy:

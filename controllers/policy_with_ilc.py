@@ -142,8 +142,9 @@ class PolicyWithILC:
         if count < LEAST_STEPS:
             return
         period = self._motion.station.period
-        corner = 2.0 * math.pi * CUTOFF_HZ * period
-        change = smooth(np.array(self._errors), tight(self._taut), corner)
+        change = smooth(
+            np.array(self._errors), tight(self._taut), 2.0 * math.pi * CUTOFF_HZ * period
+        )
         power = float(np.mean(change**2)) / (2.0 * CUTOFF_HZ * period * self._motion.noise**2)
         # Of a trial that broke off nothing is known of what would have followed.
         early = np.append(change[LEAD_STEPS:], np.full(LEAD_STEPS, change[-1]))

@@ -74,11 +74,11 @@ class LinearController(Controller, Protocol):
 
 
 ENTRY_POINTS = {
-    "serres_replay": "controllers.serres_replay:SerresReplay",
+    "serres_replay": "controllers.serres_feedforward:SerresReplay",
     "serres_feedforward": "controllers.serres_feedforward:SerresFeedforward",
-    "improved_feedforward": "controllers.improved_feedforward:ImprovedFeedforward",
+    "improved_feedforward": "controllers.serres_feedforward:ImprovedFeedforward",
     "pid": "controllers.pid:PID",
-    "feedforward_pid": "controllers.feedforward_pid:FeedforwardPID",
+    "feedforward_pid": "controllers.pid:FeedforwardPID",
     "lqg": "controllers.lqg:LQG",
     "adrc": "controllers.adrc:ADRC",
     "sliding_mode": "controllers.sliding_mode:SlidingMode",
@@ -87,8 +87,8 @@ ENTRY_POINTS = {
     "ppo": "controllers.policy:PPOPolicy",
     "ppo_ilc": "controllers.policy_with_ilc:PolicyWithILC",
     "oracle": "controllers.oracle:Oracle",
-    "constant_pressure": "controllers.exercise.constant_pressure:ConstantPressure",
-    "scheduled_pressure": "controllers.exercise.scheduled_pressure:ScheduledPressure",
+    "constant_pressure": "controllers.exercise.moment_pid:ConstantPressure",
+    "scheduled_pressure": "controllers.exercise.moment_pid:ScheduledPressure",
     "speed_pid": "controllers.exercise.speed_pid:SpeedPID",
     "moment_pid": "controllers.exercise.moment_pid:MomentPID",
     "exercise_mpc": "controllers.exercise.exercise_mpc:ExerciseMPC",

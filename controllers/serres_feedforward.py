@@ -1,6 +1,10 @@
 """The dissertation's feed-forward, computed for any pressure and reference.
 
 Voltages between samples 0.2 s apart, as the dissertation's station was driven.
+
+The voltages that the dissertation printed.
+
+Open loop: the voltage that the inverse of the nominal model gives for the reference.
 """
 
 import math
@@ -8,10 +12,14 @@ import math
 import numpy as np
 
 from controllers.design.designs import must_give_a_position
+from controllers.models.nominal_motion import NominalMotion, nominal_motion
+from controllers.models.voltage import VOLTAGE_LIMIT
 from controllers.registry import Reference
+from pma_gym.data.serres2008 import load_table, pressures
 from pma_gym.envs import Measurement, StationInfo
 from pma_gym.integrator.equations import Interpolation, check_interpolation
 from pma_gym.studies.voltage_profile import SAMPLE_TIME, feedforward, reachable_mm
+from pma_gym.tasks import TASKS
 
 
 class VoltageTable:
@@ -106,3 +114,93 @@ class SerresFeedforward(VoltageTable):
             return str(error)
         degrees = math.degrees(1e-3 * reachable_mm(pressure_kpa) / PROFILE_RADIUS)
         return f"{error} (rotation must lie in 0-{degrees:.4g} deg: 45 mm are 90 deg here)"
+
+
+class SerresReplay(VoltageTable):
+    """The voltages that the dissertation printed, unchanged.
+
+    They follow the task's own reference, whatever reference is given, and exist at the pressures
+    of the dissertation's trials alone. Those of rotation were computed for 45 mm at 90 deg.
+
+    Source:
+        Serres 2008, tables I4-I20.
+    """
+
+    name = "serres_replay"
+
+    def reset(self, reference: Reference, station: StationInfo) -> None:
+        """Look up the profile of the trial.
+
+        Raises:
+            ValueError: no profile was printed for this task or pressure; says for which one was.
+        """
+        if station.task.name not in TASKS:
+            raise ValueError(
+                f"the dissertation printed voltages of the tasks {' and '.join(TASKS)}, not of "
+                f"{station.task.name}; take serres_feedforward for another extension or rotation, "
+                "or another controller"
+            )
+        task, pressure_kpa = station.task.name, station.pressure / 1e3
+        known = pressures(task)
+        if not any(math.isclose(pressure_kpa, one) for one in known):
+            raise ValueError(
+                f"the dissertation printed voltages of the {task} task for "
+                f"{', '.join(map(str, known))} kPa, not for {pressure_kpa:g} kPa; "
+                "use serres_feedforward, which computes them for any pressure in 150-575 kPa"
+            )
+        self._period = station.period
+        self.times, self.volts = printed_voltages(task, round(pressure_kpa))
+
+
+def printed_voltages(task: str, pressure_kpa: int) -> tuple[np.ndarray, np.ndarray]:
+    """Times (s) and motor voltages (V) of a printed profile.
+
+    Args:
+        task: `displacement` or `rotation`.
+        pressure_kpa: one of `pressures(task)`.
+
+    >>> times, volts = printed_voltages("displacement", 150)
+    >>> float(times[1]), float(volts[1])
+    (0.2, 0.122178)
+    """
+    first = 4 if task == "displacement" else 13
+    table = load_table(f"I{first + pressures(task).index(pressure_kpa)}")
+    return table["time_s"], table["motor_voltage_v"]
+
+
+class ImprovedFeedforward:
+    """The voltage that the nominal model needs for the reference, one value a control period.
+
+        V = map^-1(y_ref) + lag compensation
+
+    What it mends of the dissertation's feed-forward: the lag is inverted in continuous time, so
+    there is no root at z = -1 and the voltage does not alternate; the map is the model's own
+    balance of forces, neither a quadratic nor rounded; the drive's dead zone and the cable's
+    slack are passed at once; voltages belong to control periods, not to 0.2 s. See
+    `controllers.models.inverse` for the derivation. Where the model needs less than 0 or more than
+    10 V it asks for the limit.
+
+    It sees no sensor: what the model does not know stays as error.
+    """
+
+    name = "improved_feedforward"
+
+    def __init__(self) -> None:
+        self._motion: NominalMotion | None = None
+
+    def reset(self, reference: Reference, station: StationInfo) -> None:
+        """Compute the voltages of the whole trial, or take them as computed before."""
+        self._motion = nominal_motion(reference, station)
+
+    def act(self, measurement: Measurement, time: float) -> float:
+        """Voltage (V) to send now, for it is in force the action delay later."""
+        assert self._motion is not None, "reset comes first"
+        return min(max(self._motion.command(time), 0.0), VOLTAGE_LIMIT)
+
+    def voltage(self, time: float) -> float:
+        """Voltage (V) that the motion needs in force at a time (s), also beyond the limits.
+
+        After the trial's end that of the last period.
+        """
+        assert self._motion is not None, "reset comes first"
+        return self._motion.voltage(time)

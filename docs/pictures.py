@@ -52,8 +52,7 @@ def first_controller_plot() -> bytes:
         for axis, label in zip(
             axes, ("extension (mm)", "error (mm)", "motor voltage (V)"), strict=True
         ):
-            axis.set_ylabel(label)
-            axis.set_xlabel("time (s)")
+            axis.set(ylabel=label, xlabel="time (s)")
         legend_below(figure, axes[0].get_lines(), 3)
         return png(figure)
 
@@ -77,8 +76,7 @@ def leaderboard_plot() -> bytes:
             axis.xaxis.set_major_locator(LogLocator(subs=subs, numticks=9))
             axis.xaxis.set_major_formatter("{x:g}")
             axis.xaxis.set_minor_formatter(NullFormatter())
-            axis.set_title(column)
-            axis.set_xlabel("RMSE")
+            axis.set(title=column, xlabel="RMSE")
         axes[0].set_yticks(places, names)
         return png(figure)
 
@@ -95,8 +93,7 @@ def _leaderboard_table(page: str) -> tuple[list[str], list[str], list[list[Inter
         for suite, name in zip(("robust", "robust", "hard", "hard"), header[1:], strict=True)
     ]
     names = [row[0].replace(", tenth trial", "").replace(", shipped", "") for row in rows]
-    cells = [[_interval(row[at]) for row in rows] for at in range(1, len(header))]
-    return names, columns, cells
+    return names, columns, [[_interval(row[at]) for row in rows] for at in range(1, len(header))]
 
 
 def _interval(cell: str) -> Interval | None:
@@ -150,8 +147,7 @@ def _frames(title: str, controller: Controller) -> list[np.ndarray]:
     controller.reset(env.reference, env.station)
     frames, ended = [_frame(title, env.render())], False
     while not ended:
-        action = env.action(controller.act(env.reading, env.time))
-        _, _, terminated, truncated, _ = env.step(action)
+        _, _, terminated, truncated, _ = env.step(env.action(controller.act(env.reading, env.time)))
         ended = terminated or truncated
         if env.time * FRAMES_PER_SECOND >= len(frames) - 1e-9:
             frames.append(_frame(title, env.render()))

@@ -68,8 +68,7 @@ def controllers_plot() -> bytes:
         for axis, label in zip(
             axes, ("rotation (deg)", "error (deg)", "error, enlarged (deg)"), strict=True
         ):
-            axis.set_ylabel(label)
-            axis.set_xlabel("time (s)")
+            axis.set(ylabel=label, xlabel="time (s)")
         handles = [Line2D([], [], color=each.color, label=each.label) for each in styles.values()]
         legend_below(figure, [*handles, Line2D([], [], label="Ideal", **REFERENCE)], 4)  # type: ignore[arg-type]
         return _few_colours(png(figure))
@@ -102,8 +101,13 @@ def environment_plot() -> bytes:
         shown.set_axis_off()
         axes: Any = below.subplots(1, 2 + len(SIGNALS))
         time = period * np.arange(len(observations))
-        volts = f"action (1.0 = {scales['last motor action']})"
-        axes[0].step(time[:-1], actions, where="post", color="#D55E00", label=volts)
+        axes[0].step(
+            time[:-1],
+            actions,
+            where="post",
+            color="#D55E00",
+            label=f"action (1.0 = {scales['last motor action']})",
+        )
         for axis, entries in zip(axes[1:-1], SIGNALS, strict=True):
             for entry, style in zip(entries, ENTRY_STYLES, strict=True):
                 values = observations[:, list(scales).index(entry)]
@@ -164,8 +168,7 @@ def rig_plot() -> bytes:
             (curves, "The model simulates it", "contraction (mm)"),
             (residual, f"The diagnosis names {effect.name}", "measured less simulated (mm)"),
         ):
-            axis.set_title(title)
-            axis.set_ylabel(label)
+            axis.set(title=title, ylabel=label)
         for axis in axes:
             axis.set_xlabel("time (s)")
         handles = [

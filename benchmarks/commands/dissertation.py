@@ -1,34 +1,21 @@
 """The commands about the dissertation: its profiles, tables, feed-forward, studies and model."""
 
-import sys
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from benchmarks.commands.options import (
-    INTERRUPTED,
-    RESULTS,
     Jobs,
     OptionalOut,
     Out,
     Recompute,
-    refuse,
+    app,
 )
+from benchmarks.files import RESULTS
 
 
-def register(app: typer.Typer) -> None:
-    """Add the commands to the program."""
-    app.command(epilog="Example: python -m benchmarks profiles --out profiles.csv")(profiles)
-    app.command(epilog="Example: python -m benchmarks measured --jobs 2")(measured)
-    app.command(
-        epilog="Example: python -m benchmarks voltages --controller improved_feedforward "
-        "--task rotation --pressure 400 --out volts.csv"
-    )(voltages)
-    app.command(epilog="Example: python -m benchmarks studies --out studies.csv")(studies)
-    app.command(epilog="Example: python -m benchmarks identify --out station.toml")(identify)
-
-
+@app.command(epilog="Example: python -m benchmarks profiles --out profiles.csv")
 def profiles(out: Out) -> None:
     """Regenerate the dissertation's voltage profiles (tables I4-I20)."""
     from benchmarks.dissertation import run_profiles
@@ -36,6 +23,7 @@ def profiles(out: Out) -> None:
     print(f"{run_profiles(out)} rows in {out}")
 
 
+@app.command(epilog="Example: python -m benchmarks measured --jobs 2")
 def measured(
     out: Annotated[Path, typer.Option(help="Folder of the results.")] = RESULTS / "measured",
     jobs: Jobs = 2,
@@ -56,17 +44,17 @@ def measured(
 
     for folder, option in ((out, "--out"), (write, "--write")):
         if folder is not None and folder.exists() and not folder.is_dir():
-            refuse(ValueError(f"{option} {folder} is a file; name a folder"))
+            raise ValueError(f"{option} {folder} is a file; name a folder")
     if write is not None:
         print(f"{write_trials(write)} trials in {write}")
         return
-    try:
-        run_measured(out, jobs, seed, rounds or MOST_ROUNDS, recompute=recompute)
-    except KeyboardInterrupt:
-        print(f"Interrupted; run it again, it goes on from {out / 'stages'}", file=sys.stderr)
-        raise typer.Exit(INTERRUPTED) from None
+    run_measured(out, jobs, seed, rounds or MOST_ROUNDS, recompute=recompute)
 
 
+@app.command(
+    epilog="Example: python -m benchmarks voltages --controller improved_feedforward "
+    "--task rotation --pressure 400 --out volts.csv"
+)
 def voltages(
     controller: Annotated[
         str, typer.Option(help="serres_replay, serres_feedforward or improved_feedforward.")
@@ -82,13 +70,11 @@ def voltages(
     """Write a feed-forward's voltages for a real rig as CSV."""
     from benchmarks.dissertation import Order, run_voltages
 
-    try:
-        rows = run_voltages(Order(controller, task, pressure, rate, model), out)
-    except ValueError as error:
-        refuse(error)
+    rows = run_voltages(Order(controller, task, pressure, rate, model), out)
     print(f"{rows} rows in {out}")
 
 
+@app.command(epilog="Example: python -m benchmarks studies --out studies.csv")
 def studies(out: OptionalOut = None) -> None:
     """Recompute the dissertation's regressions and variance tables beside the printed ones."""
     from benchmarks.dissertation import run_studies
@@ -96,12 +82,9 @@ def studies(out: OptionalOut = None) -> None:
     run_studies(out)
 
 
+@app.command(epilog="Example: python -m benchmarks identify --out station.toml")
 def identify(out: Out, jobs: Jobs = 2) -> None:
     """Fit the station's model from tables I2 and I3; judge it on left-out pressures and I1."""
     from benchmarks.identification.identify import run_identify
 
-    try:
-        run_identify(out, jobs)
-    except KeyboardInterrupt:
-        print("Interrupted: nothing is written", file=sys.stderr)
-        raise typer.Exit(INTERRUPTED) from None
+    run_identify(out, jobs)

@@ -7,22 +7,15 @@ import typer
 
 from benchmarks.commands.options import (
     LOCAL,
-    RESULTS,
     ExecutorOption,
     Jobs,
-    chosen_executor,
-    refuse,
+    app,
 )
+from benchmarks.executors.choice import executor_named
+from benchmarks.files import RESULTS
 
 
-def register(app: typer.Typer) -> None:
-    """Add the commands to the program."""
-    app.command(
-        epilog="Example: python -m benchmarks exercise --muscles 2 --diameter 20 --moment 10"
-    )(exercise)
-    app.command(epilog="Example: python -m benchmarks safety --episodes 100")(safety)
-
-
+@app.command(epilog="Example: python -m benchmarks exercise --muscles 2 --diameter 20 --moment 10")
 def exercise(
     muscles: Annotated[
         str, typer.Option(help="How many side by side; several by commas, else common ones.")
@@ -50,28 +43,25 @@ def exercise(
 ) -> None:
     """Show which moments muscles of which size give, and the smallest for a prescription."""
     from benchmarks.exercise.choose_device import Choice, ChoiceError, run_exercise
-    from benchmarks.exercise.profile import ProfileError, constant_prescription, read_profile
-    from pma_gym.plant.exercise_device.prescription import UnreachableError
+    from benchmarks.exercise.profile import constant_prescription, read_profile
     from pma_gym.terminal import SafeConsole
 
-    try:
-        if out.exists() and not out.is_dir():
-            raise ChoiceError(f"--out {out} is a file; name a folder for the results")
-        if moment is not None and profile is not None:
-            raise ChoiceError("--moment and --profile are two prescriptions; give one of them")
-        choice = Choice(muscles, diameter, length, radius)
-        prescription = (
-            read_profile(profile)
-            if profile
-            else None
-            if moment is None
-            else constant_prescription(moment)
-        )
-        run_exercise(choice, prescription, out, SafeConsole())
-    except (ChoiceError, ProfileError, UnreachableError) as error:
-        refuse(error)
+    if out.exists() and not out.is_dir():
+        raise ChoiceError(f"--out {out} is a file; name a folder for the results")
+    if moment is not None and profile is not None:
+        raise ChoiceError("--moment and --profile are two prescriptions; give one of them")
+    choice = Choice(muscles, diameter, length, radius)
+    prescription = (
+        read_profile(profile)
+        if profile
+        else None
+        if moment is None
+        else constant_prescription(moment)
+    )
+    run_exercise(choice, prescription, out, SafeConsole())
 
 
+@app.command(epilog="Example: python -m benchmarks safety --episodes 100")
 def safety(
     episodes: Annotated[int, typer.Option(help="With the safety layer.")] = 10_000,
     bare: Annotated[int, typer.Option(help="Without it, to be compared with.")] = 1_000,
@@ -84,9 +74,6 @@ def safety(
     from benchmarks.exercise.safety_layer import SafetyError, run_safety
     from pma_gym.terminal import SafeConsole
 
-    try:
-        if out.exists() and not out.is_dir():
-            raise SafetyError(f"--out {out} is a file; name a folder for the results")
-        run_safety(episodes, bare, seed, out, SafeConsole(), chosen_executor(executor, jobs))
-    except SafetyError as error:
-        refuse(error)
+    if out.exists() and not out.is_dir():
+        raise SafetyError(f"--out {out} is a file; name a folder for the results")
+    run_safety(episodes, bare, seed, out, SafeConsole(), executor_named(executor, jobs))

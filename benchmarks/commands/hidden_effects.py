@@ -7,29 +7,21 @@ import typer
 
 from benchmarks.commands.options import (
     LOCAL,
-    RESULTS,
     ExecutorOption,
     Jobs,
     Recompute,
-    chosen_executor,
-    refuse,
+    app,
     require_writable,
     writable_out,
 )
+from benchmarks.executors.choice import executor_named
+from benchmarks.files import RESULTS
 
 
-def register(app: typer.Typer) -> None:
-    """Add the commands to the program."""
-    app.command(
-        "hidden-effects",
-        epilog="Example: python -m benchmarks hidden-effects --block single --n 20",
-    )(hidden_effects)
-    app.command(
-        "hidden-effects-report",
-        epilog="Example: python -m benchmarks hidden-effects-report results/blocks/single-0",
-    )(hidden_effects_report)
-
-
+@app.command(
+    "hidden-effects",
+    epilog="Example: python -m benchmarks hidden-effects --block single --n 20",
+)
 def hidden_effects(
     block: Annotated[
         str,
@@ -56,22 +48,22 @@ def hidden_effects(
     recompute: Recompute = False,
 ) -> None:
     """Hide effects in trials, diagnose them, count what was named right; goes on after Ctrl-C."""
-    from benchmarks.hidden_effects.run_blocks import JobError, Order, ordered, run_hidden_effects
+    from benchmarks.hidden_effects.run_blocks import Order, ordered, run_hidden_effects
 
     require_writable(json_file, "--json")
-    places = chosen_executor(executor, jobs)
-    try:
-        blocks, orders = ordered(block, rounds), []
-        for each in blocks:
-            usual = (out or RESULTS / "hidden_effects") / f"{each.name}-{seed}"
-            folder = usual if out is None or len(blocks) > 1 else out
-            orders.append(Order(each, n, seed, folder, places, keep, recompute))
-        code = run_hidden_effects(orders, json_file)
-    except JobError as error:
-        refuse(error)
-    raise typer.Exit(code)
+    places = executor_named(executor, jobs)
+    blocks, orders = ordered(block, rounds), []
+    for each in blocks:
+        usual = (out or RESULTS / "hidden_effects") / f"{each.name}-{seed}"
+        folder = usual if out is None or len(blocks) > 1 else out
+        orders.append(Order(each, n, seed, folder, places, keep, recompute))
+    raise typer.Exit(run_hidden_effects(orders, json_file))
 
 
+@app.command(
+    "hidden-effects-report",
+    epilog="Example: python -m benchmarks hidden-effects-report results/blocks/single-0",
+)
 def hidden_effects_report(
     places: Annotated[
         list[Path], typer.Argument(help="Folders or --json files of `hidden-effects`.")
@@ -85,13 +77,10 @@ def hidden_effects_report(
 ) -> None:
     """Write the figures of several blocks of hidden effects as one page of tables."""
     from benchmarks.files import write_text
-    from benchmarks.hidden_effects.evaluation.summary import read_scores, report
-    from benchmarks.hidden_effects.run_blocks import JobError
+    from benchmarks.hidden_effects.evaluation.summary import report
+    from benchmarks.hidden_effects.run_blocks import read_scores
 
-    try:
-        text = report(read_scores(places), out.suffix if out else ".md")
-    except JobError as error:
-        refuse(error)
+    text = report(read_scores(places), out.suffix if out else ".md")
     if out is None:
         print(text)
     else:

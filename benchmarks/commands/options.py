@@ -1,14 +1,16 @@
 """Options, result folders and refusals that the commands share."""
 
 import sys
+from collections.abc import Callable
+from functools import wraps
 from pathlib import Path
-from typing import Annotated, NoReturn
+from typing import Annotated, Any, NoReturn
 
 import typer
 
 from benchmarks.executors.choice import ExecutorName
-from benchmarks.executors.executor import Executor, ExecutorMissing
-from benchmarks.files import RESULTS  # noqa: F401 (the commands take it from here)
+from benchmarks.executors.executor import ExecutorMissing
+from pma_gym.cli.options import StrictTyper
 
 INTERRUPTED = 130
 """Exit code after Ctrl-C, as shells have it."""
@@ -20,14 +22,41 @@ def refuse(error: Exception) -> NoReturn:
     raise typer.Exit(2)
 
 
-def chosen_executor(name: ExecutorName, jobs: int) -> Executor:
-    """The executor of `--executor`; refuses one that is not installed."""
-    from benchmarks.executors.choice import executor_named
+class Program(StrictTyper):
+    """Commands that end in one message where an order cannot be carried out, or after Ctrl-C."""
 
-    try:
-        return executor_named(name, jobs)
-    except ExecutorMissing as error:
-        refuse(error)
+    def command(self, *names: Any, **options: Any) -> Callable[..., Any]:
+        """See `StrictTyper`."""
+        register = super().command(*names, **options)
+        return lambda function: register(_ending_in_words(function))
+
+    def callback(self, *names: Any, **options: Any) -> Callable[..., Any]:
+        """See `StrictTyper`."""
+        register = super().callback(*names, **options)
+        return lambda function: register(_ending_in_words(function))
+
+
+def _ending_in_words(function: Callable[..., Any]) -> Callable[..., Any]:
+    @wraps(function)
+    def run(*arguments: Any, **named: Any) -> Any:  # noqa: ANN401
+        try:
+            return function(*arguments, **named)
+        except (ExecutorMissing, ValueError) as error:
+            refuse(error)
+        except KeyboardInterrupt:
+            print("Interrupted; the same command again goes on from what is kept", file=sys.stderr)
+            raise typer.Exit(INTERRUPTED) from None
+
+    return run
+
+
+app = Program(
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+    invoke_without_command=True,
+)
+"""The program, to which the modules beside this one add their commands."""
 
 
 def require_writable(path: Path | None, option: str) -> None:

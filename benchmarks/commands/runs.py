@@ -1,42 +1,25 @@
 """The commands about suites, their runs and comparisons; `targets` is for maintainers alone."""
 
-import sys
 from pathlib import Path
 from typing import Annotated, Literal
 
 import typer
 
 from benchmarks.commands.options import (
-    INTERRUPTED,
     LOCAL,
-    RESULTS,
     ExecutorOption,
     Jobs,
-    chosen_executor,
+    app,
     listed,
-    refuse,
 )
+from benchmarks.executors.choice import executor_named
 from benchmarks.executors.executor import Executor
+from benchmarks.files import RESULTS
 from pma_gym.cli.options import JsonOption
 from pma_gym.cli.terminal import print_json, print_table
 
 
-def register(app: typer.Typer) -> None:
-    """Add the commands to the program."""
-    app.callback(epilog="Example: python -m benchmarks --controllers pid --pressures 300")(
-        reproduction
-    )
-    app.command(
-        epilog="Example: python -m benchmarks run --suite robust --controllers pid,mine.py:Mine"
-    )(run)
-    app.command(epilog="Example: python -m benchmarks report robust")(report)
-    app.command(epilog="Example: python -m benchmarks compare lqg pid")(compare)
-    app.command(epilog="Example: python -m benchmarks add mine.py:Mine --suite hard")(add)
-    app.command(epilog="Example: python -m benchmarks remove Mine --suite hard")(remove)
-    app.command(epilog="Example: python -m benchmarks suites")(suites)
-    app.command(hidden=True, epilog="Example: python -m benchmarks targets robust")(targets)
-
-
+@app.command(hidden=True, epilog="Example: python -m benchmarks targets robust")
 def targets(
     suite: Annotated[str, typer.Argument(help="Name, see `suites`, or path of a TOML file.")],
     results: Annotated[
@@ -52,20 +35,16 @@ def targets(
     from benchmarks.reproduction.targets import target_table
     from benchmarks.suites.frozen import frozen_suite
     from benchmarks.suites.reproduction import ReproductionSuite
-    from benchmarks.suites.suite import SuiteError
 
-    try:
-        frozen = frozen_suite(suite)
-        folder = results or RESULTS / frozen.name
-        if isinstance(frozen, ReproductionSuite):
-            checks = targets_again(frozen, folder, chosen_executor(LOCAL, 2))
-            table = target_table(checks, frozen.models[0])
-        else:
-            with Bounds(frozen.model, folder) as bounds:
-                checks = read_leaderboard(frozen, folder, bounds).verdicts
-            table = verdict_table(checks)
-    except SuiteError as error:
-        refuse(error)
+    frozen = frozen_suite(suite)
+    folder = results or RESULTS / frozen.name
+    if isinstance(frozen, ReproductionSuite):
+        checks = targets_again(frozen, folder, executor_named(LOCAL, 2))
+        table = target_table(checks, frozen.models[0])
+    else:
+        with Bounds(frozen.model, folder) as bounds:
+            checks = read_leaderboard(frozen, folder, bounds).verdicts
+        table = verdict_table(checks)
     documents = [check.document() for check in checks]
     if as_json:
         print_json(documents)
@@ -74,6 +53,9 @@ def targets(
     raise typer.Exit(1 if any(each["verdict"] == "missed" for each in documents) else 0)
 
 
+@app.command(
+    epilog="Example: python -m benchmarks run --suite robust --controllers pid,mine.py:Mine"
+)
 def run(
     suite: Annotated[str, typer.Option(help="Name, see `suites`, or path of a TOML file.")],
     controllers: Annotated[
@@ -95,40 +77,31 @@ def run(
     """Compare controllers on a frozen suite; an interrupted run goes on where it stopped."""
     from benchmarks.comparison.job import chosen, run_comparison
     from benchmarks.reproduction.reproduce import run_job
-    from benchmarks.runner.controller_spec import ControllerError
     from benchmarks.suites.frozen import frozen_suite
     from benchmarks.suites.reproduction import ReproductionSuite
     from benchmarks.suites.suite import SuiteError
     from pma_gym.data.files.trial_formats import needed
-    from pma_gym.data.trial import TrialError
     from pma_gym.terminal import SafeConsole
 
-    places = chosen_executor(executor, jobs)
-    try:
-        if traces == "parquet":
-            needed("pyarrow", "--traces parquet")
-        frozen = frozen_suite(suite)
-        folder = out or RESULTS / frozen.name
-        if isinstance(frozen, ReproductionSuite):
-            specs = [entry.spec for entry in chosen(frozen, controllers)]
-            if stations is not None:
-                raise SuiteError(
-                    f"suite {frozen.name} has models, no stations; leave --stations out"
-                )
-            selected = frozen.select(controllers=specs, tasks=listed(task))
-            code = run_job(selected, folder, places, SafeConsole(), traces or "")
-        else:
-            part = frozen.part(stations, listed(task))
-            entries = chosen(part, controllers)
-            code = run_comparison(part, entries, folder, places, SafeConsole(), traces or "")
-    except (ControllerError, SuiteError, TrialError) as error:
-        refuse(error)
-    except KeyboardInterrupt:
-        print("Interrupted before the first case; run it again", file=sys.stderr)
-        code = INTERRUPTED
+    places = executor_named(executor, jobs)
+    if traces == "parquet":
+        needed("pyarrow", "--traces parquet")
+    frozen = frozen_suite(suite)
+    folder = out or RESULTS / frozen.name
+    if isinstance(frozen, ReproductionSuite):
+        specs = [entry.spec for entry in chosen(frozen, controllers)]
+        if stations is not None:
+            raise SuiteError(f"suite {frozen.name} has models, no stations; leave --stations out")
+        selected = frozen.select(controllers=specs, tasks=listed(task))
+        code = run_job(selected, folder, places, SafeConsole(), traces or "")
+    else:
+        part = frozen.part(stations, listed(task))
+        entries = chosen(part, controllers)
+        code = run_comparison(part, entries, folder, places, SafeConsole(), traces or "")
     raise typer.Exit(code)
 
 
+@app.command(epilog="Example: python -m benchmarks report robust")
 def report(
     suite: Annotated[str, typer.Argument(help="Name, see `suites`, or path of a TOML file.")],
     results: Annotated[
@@ -148,24 +121,21 @@ def report(
     from benchmarks.reproduction.reproduce import report_again
     from benchmarks.suites.frozen import frozen_suite
     from benchmarks.suites.reproduction import ReproductionSuite
-    from benchmarks.suites.suite import SuiteError
 
-    try:
-        frozen = frozen_suite(suite)
-        folder = results or RESULTS / frozen.name
-        if isinstance(frozen, ReproductionSuite):
-            page = report_again(frozen, folder, out or folder, local(2), vector)
-        else:
-            page, ranks, incomplete = run_report(frozen, folder, out or folder, vector)
-            print_table(ranks)
-            if incomplete:
-                print(f"Not complete, so not in every column: {incomplete}")
-                print(f"Run the rest: {run_command(frozen, folder)}")
-        print(f"Report: {page}")
-    except SuiteError as error:
-        refuse(error)
+    frozen = frozen_suite(suite)
+    folder = results or RESULTS / frozen.name
+    if isinstance(frozen, ReproductionSuite):
+        page = report_again(frozen, folder, out or folder, local(2), vector)
+    else:
+        page, ranks, incomplete = run_report(frozen, folder, out or folder, vector)
+        print_table(ranks)
+        if incomplete:
+            print(f"Not complete, so not in every column: {incomplete}")
+            print(f"Run the rest: {run_command(frozen, folder)}")
+    print(f"Report: {page}")
 
 
+@app.command(epilog="Example: python -m benchmarks compare lqg pid")
 def compare(
     first: Annotated[
         str, typer.Argument(help="Controller, folder of one, or FOLDER:CONTROLLER.", metavar="A")
@@ -178,14 +148,11 @@ def compare(
 ) -> None:
     """Say in one line which of two controllers is better, by how much, and if they differ."""
     from benchmarks.comparison.compare import compare as compared
-    from benchmarks.suites.suite import SuiteError
 
-    try:
-        print(compared(first, second, results, task))
-    except SuiteError as error:
-        refuse(error)
+    print(compared(first, second, results, task))
 
 
+@app.command(epilog="Example: python -m benchmarks add mine.py:Mine --suite hard")
 def add(
     controller: Annotated[str, typer.Argument(help="path/to/file.py:ClassName")],
     suite: Annotated[str, typer.Option(help="Suites by commas; else all but `many`.")] = "",
@@ -196,23 +163,16 @@ def add(
 ) -> None:
     """Score your own controller on all suites, and say where it stands or what to fix."""
     from benchmarks.comparison.add import own_controller, run_add
-    from benchmarks.runner.controller_spec import ControllerError
     from benchmarks.suites.frozen import frozen_suite, suite_names
-    from benchmarks.suites.suite import SuiteError
     from pma_gym.terminal import SafeConsole
 
-    try:
-        frozen = [frozen_suite(name) for name in listed(suite) or suite_names()]
-        frozen = [one for one in frozen if suite or not one.only_by_name]
-        code = run_add(own_controller(controller), frozen, results, jobs, SafeConsole())
-    except (ControllerError, SuiteError) as error:
-        refuse(error)
-    except KeyboardInterrupt:
-        print("Interrupted before the first case; run it again", file=sys.stderr)
-        code = INTERRUPTED
+    frozen = [frozen_suite(name) for name in listed(suite) or suite_names()]
+    frozen = [one for one in frozen if suite or not one.only_by_name]
+    code = run_add(own_controller(controller), frozen, results, jobs, SafeConsole())
     raise typer.Exit(code)
 
 
+@app.command(epilog="Example: python -m benchmarks remove Mine --suite hard")
 def remove(
     controller: Annotated[str, typer.Argument(help="Name as the journal has it: the class.")],
     suite: Annotated[str, typer.Option(help="Suites by commas; else all.")] = "",
@@ -224,19 +184,16 @@ def remove(
     from benchmarks.comparison.job import remove_controller
     from benchmarks.report.leaderboard import report_command
     from benchmarks.suites.frozen import frozen_suite, suite_names
-    from benchmarks.suites.suite import SuiteError
 
-    try:
-        frozen = [frozen_suite(name) for name in listed(suite) or suite_names()]
-        removed = remove_controller(controller, frozen, results)
-        by_folder = {results / each.name: each for each in frozen}
-        for path, count in removed.items():
-            again = report_command(by_folder[path.parent], path.parent)
-            print(f"{path}: {count} rows of {controller} removed; update its page: {again}")
-    except SuiteError as error:
-        refuse(error)
+    frozen = [frozen_suite(name) for name in listed(suite) or suite_names()]
+    removed = remove_controller(controller, frozen, results)
+    by_folder = {results / each.name: each for each in frozen}
+    for path, count in removed.items():
+        again = report_command(by_folder[path.parent], path.parent)
+        print(f"{path}: {count} rows of {controller} removed; update its page: {again}")
 
 
+@app.command(epilog="Example: python -m benchmarks suites")
 def suites(as_json: JsonOption = False) -> None:
     """List the frozen suites: their versions, cases and controllers."""
     from benchmarks.comparison.job import print_suites, suite_documents
@@ -248,6 +205,7 @@ def suites(as_json: JsonOption = False) -> None:
         print_suites(SafeConsole())
 
 
+@app.callback(epilog="Example: python -m benchmarks --controllers pid --pressures 300")
 def reproduction(
     context: typer.Context,
     out: Annotated[Path, typer.Option(help="Folder.")] = RESULTS / "reproduction",
@@ -266,11 +224,7 @@ def reproduction(
     """Run every controller through every trial and write the report."""
     if context.invoked_subcommand is not None:
         return
-    try:
-        code = reproduce(out, controllers, model, task, pressures, chosen_executor(executor, jobs))
-    except KeyboardInterrupt:
-        print("Interrupted before the first case; run it again", file=sys.stderr)
-        code = INTERRUPTED
+    code = reproduce(out, controllers, model, task, pressures, executor_named(executor, jobs))
     raise typer.Exit(code)
 
 
@@ -279,23 +233,20 @@ def reproduce(
 ) -> int:
     """The main job; its exit code."""
     from benchmarks.reproduction.reproduce import run_job
-    from benchmarks.runner.controller_spec import ControllerError, parse_controllers
+    from benchmarks.runner.controller_spec import parse_controllers
     from benchmarks.suites.frozen import load_suite
     from benchmarks.suites.suite import SuiteError
-    from pma_gym.plant.model import ModelError, load_model
+    from pma_gym.plant.model import load_model
     from pma_gym.terminal import SafeConsole
 
     suite = load_suite()
-    try:
-        models = listed(model)
-        for name in models or suite.models:
-            load_model(name)
-        chosen = parse_controllers(controllers, suite.controllers) if controllers else []
-        suite = suite.select(models, chosen, listed(task), _pressures(pressures))
-        if out.exists() and not out.is_dir():
-            raise SuiteError(f"--out {out} is a file; name a folder for the results")
-    except (ControllerError, ModelError, SuiteError) as error:
-        refuse(error)
+    models = listed(model)
+    for name in models or suite.models:
+        load_model(name)
+    chosen = parse_controllers(controllers, suite.controllers) if controllers else []
+    suite = suite.select(models, chosen, listed(task), _pressures(pressures))
+    if out.exists() and not out.is_dir():
+        raise SuiteError(f"--out {out} is a file; name a folder for the results")
     return run_job(suite, out, executor, SafeConsole())
 
 

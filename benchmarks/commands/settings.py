@@ -8,27 +8,17 @@ import typer
 
 from benchmarks.commands.options import (
     INTERRUPTED,
-    RESULTS,
     Jobs,
     OptionalOut,
+    app,
     listed,
     refuse,
     require_writable,
 )
+from benchmarks.files import RESULTS
 
 
-def register(app: typer.Typer) -> None:
-    """Add the commands to the program."""
-    app.command(
-        epilog="Example: python -m benchmarks tune --only '50hz*/rotation' --out gains.toml"
-    )(tune)
-    app.command(epilog="Example: python -m benchmarks design --controllers lqg --out designs.toml")(
-        design
-    )
-    app.command(epilog="Example: python -m benchmarks remake --list")(remake)
-    app.command(epilog="Example: python -m benchmarks speed --quick --only single")(speed)
-
-
+@app.command(epilog="Example: python -m benchmarks speed --quick --only single")
 def speed(
     json_file: Annotated[
         Path | None, typer.Option("--json", help="File for all figures, in a folder that exists.")
@@ -43,15 +33,12 @@ def speed(
     quick: Annotated[bool, typer.Option(help="A smoke run, whose figures say little.")] = False,
 ) -> None:
     """Measure this package's speed beside other simulators' (`make peers` installs them)."""
-    from benchmarks.speed.run import RequestError, run_speed
+    from benchmarks.speed.run import run_speed
 
-    try:
-        code = run_speed(json_file, check, only, quick)
-    except RequestError as error:
-        refuse(error)
-    raise typer.Exit(code)
+    raise typer.Exit(run_speed(json_file, check, only, quick))
 
 
+@app.command(epilog="Example: python -m benchmarks remake --list")
 def remake(
     only: Annotated[str, typer.Option(help="Steps by commas, see --list; else all.")] = "",
     without: Annotated[str, typer.Option(help="Steps that are left out, by commas.")] = "",
@@ -79,7 +66,7 @@ def remake(
     for option, listed_names in (("--only", listed(only)), ("--without", listed(without))):
         for name in listed_names:
             if name not in names:
-                refuse(ValueError(f"{option} takes {', '.join(names)}, got {name!r}"))
+                raise ValueError(f"{option} takes {', '.join(names)}, got {name!r}")
     chosen = [
         step
         for step in every
@@ -95,14 +82,10 @@ def remake(
     if table:
         job.table()
         return
-    try:
-        complete = job.go()
-    except KeyboardInterrupt:
-        print("Interrupted; run it again, it goes on where it stopped", file=sys.stderr)
-        raise typer.Exit(INTERRUPTED) from None
-    raise typer.Exit(0 if complete else 1)
+    raise typer.Exit(0 if job.go() else 1)
 
 
+@app.command(epilog="Example: python -m benchmarks tune --only '50hz*/rotation' --out gains.toml")
 def tune(
     out: OptionalOut = None,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the noise.")] = 0,
@@ -127,6 +110,7 @@ def tune(
     raise typer.Exit(0 if written else INTERRUPTED)
 
 
+@app.command(epilog="Example: python -m benchmarks design --controllers lqg --out designs.toml")
 def design(
     controllers: Annotated[
         str, typer.Option(help="Names by commas; else all that have settings.")
@@ -148,8 +132,5 @@ def design(
     from benchmarks.tuning.design import run_design
     from controllers.design.designs import DESIGNS_FILE
 
-    try:
-        complete = run_design(listed(controllers), out or DESIGNS_FILE, seed, jobs, recompute, only)
-    except ValueError as error:
-        refuse(error)
+    complete = run_design(listed(controllers), out or DESIGNS_FILE, seed, jobs, recompute, only)
     raise typer.Exit(0 if complete else INTERRUPTED)

@@ -3,8 +3,6 @@
 A run's scores: a table of all cases as a file, and a few figures on the terminal.
 """
 
-import csv
-import io
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
@@ -17,7 +15,7 @@ from rich.table import Table
 
 from benchmarks.executors.executor import ProcessDied, TookTooLong, run_all
 from benchmarks.executors.local import LocalProcesses
-from benchmarks.files import write_text
+from benchmarks.files import csv_text, write_text
 from benchmarks.report.leaderboard import read_leaderboard, remove_command, run_command
 from benchmarks.report.standings import Standings
 from benchmarks.runner.case import BY_LIMIT, Row
@@ -57,23 +55,21 @@ figures and times. All but the times are the same bits in every run."""
 
 def write_scores(out: Path, todo: PendingCases, rows: Sequence[Row]) -> None:
     """Write `scores.csv`, in the order of the plan's cases."""
-    write_text(out / SCORES, csv_text(todo, rows))
+    write_text(out / SCORES, scores_text(todo, rows))
 
 
-def csv_text(todo: PendingCases, rows: Sequence[Row]) -> str:
+def scores_text(todo: PendingCases, rows: Sequence[Row]) -> str:
     """A row for each case that is done."""
     by_case = {row_identity(row): row for row in rows}
     ordered = [by_case[its] for case in todo.cases if (its := identity(case)) in by_case]
     phases = list(dict.fromkeys(name for row in ordered for name in row.get("phases", ())))
-    out = io.StringIO(newline="")
-    writer = csv.writer(out, lineterminator="\n")
-    writer.writerow([*WHO, *FIGURES, *(f"rmse_{name}" for name in phases), *TIMES])
+    cells = [[*WHO, *FIGURES, *(f"rmse_{name}" for name in phases), *TIMES]]
     for row in ordered:
         each = row.get("phases", {})
         by_phase = [each[name]["rmse"] if name in each else "" for name in phases]
         known, times = ([row.get(name, "") for name in names] for names in (FIGURES, TIMES))
-        writer.writerow([*(row.get(name, "") for name in WHO), *known, *by_phase, *times])
-    return out.getvalue()
+        cells.append([*(row.get(name, "") for name in WHO), *known, *by_phase, *times])
+    return csv_text(cells)
 
 
 def print_scores(

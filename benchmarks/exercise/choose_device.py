@@ -11,10 +11,10 @@ from pathlib import Path
 from rich.console import Console
 
 from benchmarks.dissertation import write_csv
-from benchmarks.exercise.plots import exercise_plot
 from benchmarks.exercise.profile import Answer, Prescription, answer
 from benchmarks.exercise.tables import (
     check_table,
+    exercise_plot,
     knee_table,
     makers_table,
     range_table,
@@ -86,8 +86,7 @@ class Choice:
         return self._devices(model, SEARCHED)
 
     def _devices(self, model: Model, common: dict) -> list[Device]:
-        own = RADIUS.from_si(own_device(model).radius)
-        defaults = {**common, "radius": (own,)}
+        defaults = {**common, "radius": (RADIUS.from_si(own_device(model).radius),)}
         options = [
             numbers(name, getattr(self, name)) or default for name, default in defaults.items()
         ]

@@ -71,8 +71,9 @@ def safety_table(safety: Safety) -> TextTable:
         "Layer | unsafe",
         "Layer | N m",
         "Layer | deg/s",
+        "None | episodes",
+        "None | unsafe",
     ]
-    header += ["None | episodes", "None | unsafe"]
     bare = {(t.task, t.stations, t.agent): t for t in safety.tallies if not t.safety}
     rows = []
     for tally in (t for t in safety.tallies if t.safety):
@@ -80,8 +81,9 @@ def safety_table(safety: Safety) -> TextTable:
         compared = [f"{without.episodes}", f"{without.violations}"] if without else [NONE, NONE]
         rows.append([*_cells(tally), *compared])
     limits = f"{SAFE_MOMENT:g} N m, {SAFE_SPEED / SI_FACTORS['deg']:g} deg/s"
-    title = f"Episodes with and without the safety layer; safe: up to {limits}"
-    return TextTable(title, header, rows, words=3)
+    return TextTable(
+        f"Episodes with and without the safety layer; safe: up to {limits}", header, rows, words=3
+    )
 
 
 def _cells(tally: Tally) -> list[str]:

@@ -13,12 +13,13 @@ from benchmarks.files import UNREADABLE, reason, say_damaged, write_text
 from benchmarks.hidden_effects.evaluation import records, scoring
 from benchmarks.hidden_effects.evaluation.records import CaseRecord, measured_now
 from benchmarks.hidden_effects.evaluation.rounds import Judge, Work, diagnosed
-from benchmarks.hidden_effects.evaluation.targets import RATES, percent, table
+from benchmarks.hidden_effects.evaluation.summary import report
+from benchmarks.hidden_effects.evaluation.targets import RATES, percent
 from benchmarks.hidden_effects.evaluation.verdicts import Outcome
-from benchmarks.hidden_effects.generation.blocks import Block
+from benchmarks.hidden_effects.generation.cases import Block
 from benchmarks.hidden_effects.generation.undecidable import BLOCKS
 from benchmarks.runner.fingerprint import code_digest_with
-from pma_gym.document_shape import Whole, check_shape
+from pma_gym.document_shape import ListOf, ShapeError, Whole, check_shape
 from pma_gym.documents import read_json
 
 FAILED, INTERRUPTED = 1, 130
@@ -164,6 +165,46 @@ def merged(documents: Sequence[dict[str, Any]]) -> dict[str, Any]:
     }
 
 
+_MEASURED = ListOf({"commit": str, "date": str, "method": str}, 1)
+_SCORE = {"seed": object, "blocks": {"*": {"measured": _MEASURED}}, "failures": ListOf(str)}
+"""Shape of the figures that the job writes."""
+
+
+def read_scores(places: Sequence[Path]) -> dict[str, Any]:
+    """Figures of folders that the job filled, or of its JSON files, as one document.
+
+    Raises:
+        JobError: nothing to read, no figures in it, or two sets of one block.
+    """
+    documents = []
+    for place in places:
+        path = place / SCORE if place.is_dir() else place
+        if not path.is_file():
+            raise JobError(
+                f"{path}: there is no such file; name a folder in which `python -m benchmarks "
+                "hidden-effects` ended, or its --json file"
+            )
+        try:
+            document = read_json(path, "journal_mib", own=True)
+        except ValueError as error:
+            raise JobError(
+                f"{path} is no JSON file ({error}); name one that the job wrote"
+            ) from None
+        try:
+            check_shape(document, _SCORE)
+        except ShapeError as error:
+            raise JobError(
+                f"{path} holds no figures of `python -m benchmarks hidden-effects` ({error}); run "
+                "it again, or name another"
+            ) from None
+        documents.append(document)
+    names = [name for document in documents for name in document["blocks"]]
+    for name in names:
+        if names.count(name) > 1:
+            raise JobError(f"block {name} is in {names.count(name)} of the files; name it once")
+    return merged(documents)
+
+
 def run_hidden_effects(orders: Sequence[Order], json_file: Path | None) -> int:
     """Run blocks one after the other and print their figures.
 
@@ -178,7 +219,7 @@ def run_hidden_effects(orders: Sequence[Order], json_file: Path | None) -> int:
         if document is None:
             return INTERRUPTED
         documents.append(document)
-        print(table(document), end="\n\n", flush=True)
+        print(report(document), flush=True)
     whole = merged(documents)
     if json_file is not None:
         write_text(json_file, json_text(whole))

@@ -120,8 +120,7 @@ def _noted(model: Model, folds: list[dict[str, float]]) -> Model:
     values["cable.damping_n_s_per_mm"] = _rounded(
         model.values_in_files("cable")["damping_n_s_per_mm"]  # type: ignore[arg-type]
     )
-    rounded = model.replace(values)
-    return Model(model.name, model.title, model.plant, rounded.parameters, notes)
+    return Model(model.name, model.title, model.plant, model.replace(values).parameters, notes)
 
 
 def _possible(model: Model, path: str, low: float, high: float) -> tuple[float, float]:

@@ -196,8 +196,7 @@ def cable_damping(model: Model) -> float:
 def fitted_parameters(model: Model) -> dict[str, float]:
     """The values that the tables determine, by parameter, in file units."""
     creeps = CREEP if "creep" in model.parameters else {}
-    names = [*statics.PARAMETERS, *creeps, *_LINES]
-    return {name: _value(model, name) for name in names}
+    return {name: _value(model, name) for name in [*statics.PARAMETERS, *creeps, *_LINES]}
 
 
 _LINES = (

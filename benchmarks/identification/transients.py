@@ -106,9 +106,11 @@ def _minimum(cost: np.ndarray) -> np.ndarray:
     best = np.clip(np.argmin(cost, axis=1), 1, cost.shape[1] - 2)
     rows = np.arange(cost.shape[0])
     before, at, after = (cost[rows, best + k] for k in (-1, 0, 1))
-    offset = 0.5 * (before - after) / (before - 2.0 * at + after)
     spacing = np.log(_TIME_CONSTANTS[1] / _TIME_CONSTANTS[0])
-    return np.exp(np.log(_TIME_CONSTANTS[best]) + np.clip(offset, -1.0, 1.0) * spacing)
+    return np.exp(
+        np.log(_TIME_CONSTANTS[best])
+        + np.clip(0.5 * (before - after) / (before - 2.0 * at + after), -1.0, 1.0) * spacing
+    )
 
 
 def damping_of(model: Model, pressure: np.ndarray) -> np.ndarray:

@@ -136,8 +136,11 @@ def limit_errors(model: Model, data: Dataset) -> dict[str, Array]:
 def _at_measured_load(trial: Trial, model: Model) -> Trial:
     """A trial of I3 whose drive gives the load that was measured in place of the usual one."""
     volts, drive = trial.commands["motor_voltage"], model.parameters["drive"]
-    needed = (trial.measurements["load"][LOADED] - drive.offset) / drive.gain
-    scaled = np.clip(needed, 0.0, 10.0) * volts / volts.max()
+    scaled = (
+        np.clip((trial.measurements["load"][LOADED] - drive.offset) / drive.gain, 0.0, 10.0)
+        * volts
+        / volts.max()
+    )
     return Trial(trial.time, {**trial.commands, "motor_voltage": scaled}, trial.measurements)
 
 
@@ -330,5 +333,6 @@ def undecidable(
 def _entry(each: ScreeningScore, proposals: list[Proposal]) -> Undecidable:
     name = each.candidate.name
     places = [k for k, proposal in enumerate(proposals, 1) if name in proposal.shows]
-    port = CATALOGUE[each.candidate.effect].port
-    return Undecidable(name, port, each.resolvable, places[0] if places else None)
+    return Undecidable(
+        name, CATALOGUE[each.candidate.effect].port, each.resolvable, places[0] if places else None
+    )

@@ -69,8 +69,13 @@ def _blocks(result: Measured) -> list[Block]:
     ]
     for phase, label in PHASE_NAMES.items():
         unit = "mm" if phase == "displacement" else "deg"
-        title = f"{label}: mean absolute error ({unit}, slope in {unit}/s)"
-        blocks.append(TextTable(title, REPLAY_HEADER, replay_rows(result, phase)))
+        blocks.append(
+            TextTable(
+                f"{label}: mean absolute error ({unit}, slope in {unit}/s)",
+                REPLAY_HEADER,
+                replay_rows(result, phase),
+            )
+        )
     blocks.append(Heading("What these tables cannot tell"))
     blocks.append(
         TextTable(
@@ -108,11 +113,12 @@ def errors_picture(result: Measured) -> bytes:
             one = panel.barh(at - 0.2, unseen, 0.38, color=PARAMETERS, label="took no part")
             two = panel.barh(at + 0.2, seen, 0.38, color=AFTER, label="fitted to")
             panel.bar_label(one, [f"{value:.2f}" for value in unseen], padding=2, fontsize=8)
-            line = panel.axvline(result.floors[key], label="repeats", **FLOOR)
-            handles = [one, two, line]
-            panel.set_xscale("log")
-            panel.set_xlim(0.4 * result.floors[key], 2.2 * max(*unseen, *seen))
-            panel.set_xlabel(title)
+            handles = [one, two, panel.axvline(result.floors[key], label="repeats", **FLOOR)]
+            panel.set(
+                xscale="log",
+                xlim=(0.4 * result.floors[key], 2.2 * max(*unseen, *seen)),
+                xlabel=title,
+            )
             panel.set_yticks(at, labels)
             panel.grid(visible=False, axis="y")
         goal = panels[0].axvline(TARGET_MM, color=BEFORE, linewidth=1.0, label="target, 1 mm")
@@ -134,9 +140,11 @@ def replays_picture(result: Measured) -> bytes:
             ]
             bars = panel.barh(at, values, 0.65, color=PARAMETERS)
             panel.bar_label(bars, [f"{value:.2f}" for value in values], padding=2, fontsize=8)
-            panel.set_title("displacement" if phase == "displacement" else f"rotation {phase}")
-            panel.set_xlabel(f"error ({unit})")
-            panel.set_xlim(0.0, 1.25 * np.nanmax(values))
+            panel.set(
+                title="displacement" if phase == "displacement" else f"rotation {phase}",
+                xlabel=f"error ({unit})",
+                xlim=(0.0, 1.25 * np.nanmax(values)),
+            )
             panel.set_yticks(at, labels)
             panel.grid(visible=False, axis="y")
         panels[0].invert_yaxis()

@@ -16,12 +16,10 @@ import numpy as np
 from benchmarks.files import write_text
 from benchmarks.measured.held_out import AT_LOAD, FIGURES, Rig, limit_errors, rms, worked
 from benchmarks.measured.rounds import Stages
-from benchmarks.reproduction.replay import ReplayError, all_replay_errors, summarise
+from benchmarks.reproduction.replay import all_replay_errors, summarise
 from benchmarks.reproduction.results import Results, scores_of
 from benchmarks.runner.case import cases, run_case
-from benchmarks.runner.controller_spec import ControllerSpec
 from benchmarks.suites.frozen import load_suite
-from benchmarks.suites.reproduction import ReproductionSuite
 from pma_gym.data.datasets.dataset import Dataset
 from pma_gym.data.trial import Trial
 from pma_gym.discovery.fitting.journal import digest
@@ -38,70 +36,29 @@ PHASE_NAMES = {
 """Phases in words, with the tables that they are held against."""
 
 
-@dataclass(frozen=True)
-class Replay:
-    """Difference of a model's replay from the measured trial in one phase.
-
-    Attributes:
-        task: displacement or rotation.
-        phase: of it.
-        slope: mean absolute error of the slope (mm/s or deg/s).
-        intercept: of the intercept (mm or deg).
-        mean: of the mean position (mm or deg).
-        mean_signed: mean error of the mean position (mm or deg).
-        rmse: mean absolute difference of the RMSE (mm or deg).
-        trials: how many trials.
-        errors: each trial's.
-    """
-
-    task: str
-    phase: str
-    slope: float
-    intercept: float
-    mean: float
-    mean_signed: float
-    rmse: float
-    trials: int
-    errors: tuple[ReplayError, ...] = ()
-
-
-def replays(model: Path | str, suite: ReproductionSuite | None = None) -> list[Replay]:
+def replays(model: Path) -> list[dict[str, object]]:
     """Replay the printed voltages on a model, open loop.
 
     Args:
-        model: a shipped name, or a TOML file.
-        suite: what is run; all trials of the reproduction if not given.
+        model: a TOML file.
     Returns:
-        One a phase; a trial that the model cannot be driven through is left out.
+        For each phase mean absolute errors of slope, intercept, mean position and RMSE, and the
+        mean error of the mean position (mm, deg, s), over the trials that the model can be driven
+        through.
     """
-    suite = suite or load_suite()
-    suite = suite.select([str(model)], [_replay(suite)])
+    suite = load_suite()
+    replay = next(each for each in suite.controllers if each.name == suite.goals.replay)
+    suite = suite.select([str(model)], [replay])
     rows = [run_case(case) for case in cases(suite, suite.entries)]
     results = Results(suite, scores_of(suite, rows))
-    return [
-        _summary(task, phase, errors)
-        for (task, phase), errors in all_replay_errors(results, str(model)).items()
-    ]
-
-
-def _replay(suite: ReproductionSuite) -> ControllerSpec:
-    return next(each for each in suite.controllers if each.name == suite.goals.replay)
-
-
-def _summary(task: str, phase: str, errors: Sequence[ReplayError]) -> Replay:
-    summary = summarise(errors)
-    absolute: Mapping[str, float] = summary.absolute
-    return Replay(
-        task,
-        phase,
-        absolute["slope"],
-        absolute["intercept"],
-        absolute["mean"],
-        summary.signed["mean"],
-        absolute["rmse"],
-        summary.trials,
-        tuple(errors),
-    )
+    replayed = []
+    for (task, phase), errors in all_replay_errors(results, str(model)).items():
+        summary = summarise(errors)
+        absolute = {name: summary.absolute[name] for name in ("slope", "intercept", "mean")}
+        signed = {"mean_signed": summary.signed["mean"], "rmse": summary.absolute["rmse"]}
+        place = {"task": task, "phase": phase}
+        replayed.append({**place, **absolute, **signed, "trials": summary.trials})
+    return replayed
 
 
 AS_GIVEN, REFITTED = "as given", "parameters refitted"
@@ -225,13 +182,9 @@ def _judged(
         effects,
         {each: rms(errors) for each, errors in limit_errors(model, seen).items()},
         {each: rms(errors) for each, errors in limit_errors(model, unseen).items()},
-        [_plain(each) for each in replays(path)],
+        replays(path),
         dump_model(worked(model)),
     )
-
-
-def _plain(replay: Replay) -> dict[str, object]:
-    return {key: value for key, value in asdict(replay).items() if key != "errors"}
 
 
 CYCLES, RATE_HZ = 3, 100.0
@@ -269,10 +222,8 @@ class Triangle:
 
     def contraction(self, model: Model) -> np.ndarray:
         """Simulate the contraction in the last period (m), shape (n,)."""
-        count = round(CYCLES * self.period_s * RATE_HZ)
-        time = np.arange(count + 1) / RATE_HZ
-        phase = np.mod(time / self.period_s, 1.0)
-        share = 1.0 - np.abs(2.0 * phase - 1.0)
+        time = np.arange(round(CYCLES * self.period_s * RATE_HZ) + 1) / RATE_HZ
+        share = 1.0 - np.abs(2.0 * np.mod(time / self.period_s, 1.0) - 1.0)
         pressure = self.low_kpa + (self.high_kpa - self.low_kpa) * share
         trial = Trial(
             time,

@@ -181,8 +181,12 @@ NOT_DETECTABLE_HEADER = (
 def print_measured(result: Measured, console: Console) -> None:
     """All of it as tables."""
     console = console if console.is_terminal else SafeConsole(file=console.file, width=WIDTH)
-    header = ("round", "trials", "verdict", "added", "p", "explains as much")
-    _print(console, "Diagnoses of I2 and I3", header, round_rows(result.rounds))
+    _print(
+        console,
+        "Diagnoses of I2 and I3",
+        ("round", "trials", "verdict", "added", "p", "explains as much"),
+        round_rows(result.rounds),
+    )
     names = tuple(label for _, label in COLUMNS)
     title = "Table I3 at pressures that took no part: rms error, from the commands alone"
     _print(console, title, ("model", *names), error_rows(result))

@@ -51,8 +51,11 @@ def measured_dataset(
     Returns:
         I3's trials, then I2's, then I3's no-load contractions.
     """
-    trials = [*_limits(pressures_kpa, loads_n, repeats), *_steps(pressures_kpa, steps)]
-    trials += _walks(pressures_kpa, loads_n, repeats)
+    trials = [
+        *_limits(pressures_kpa, loads_n, repeats),
+        *_steps(pressures_kpa, steps),
+        *_walks(pressures_kpa, loads_n, repeats),
+    ]
     return Dataset(TITLE, "serres2008", tuple(trials))
 
 

@@ -241,5 +241,4 @@ def load_step(loop: Loop, duration: float) -> tuple[NDArray, NDArray]:
 def _step(system: Any, duration: float) -> tuple[NDArray, NDArray]:  # noqa: ANN401
     period = float(system.dt)
     times = period * np.arange(round(duration / period) + 1)
-    response = control.step_response(system, times)
-    return times, np.squeeze(np.asarray(response.outputs))
+    return times, np.squeeze(np.asarray(control.step_response(system, times).outputs))

@@ -67,13 +67,16 @@ def _figure(standings: Standings, styles: Mapping[str, Style]) -> InteractiveFig
         )
         for name in errors.names
     ]
-    caption = (
-        f"{title}: every case. Hover for its station; click a controller to hide it, double-click "
-        "to see it alone; drag to zoom, double-click to zoom out."
-    )
     name = "cases-" + "-".join(errors.measure.name.split())
-    label = f"RMSE ({errors.measure.unit})"
-    return InteractiveFigure(name, caption, "pressure (kPa)", label, traces, logarithmic=True)
+    return InteractiveFigure(
+        name,
+        f"{title}: every case. Hover for its station; click a controller to hide it, double-click "
+        "to see it alone; drag to zoom, double-click to zoom out.",
+        "pressure (kPa)",
+        f"RMSE ({errors.measure.unit})",
+        traces,
+        logarithmic=True,
+    )
 
 
 _RANKS = (
@@ -135,8 +138,7 @@ def _opening(leaderboard: Leaderboard) -> list[Block]:
         "Every trial is scored on the true motion at 384 Hz."
     )
     blocks: list[Block] = [Heading(f"Leaderboard: {suite.name}", 1), Paragraph(text)]
-    notes = _notes(leaderboard)
-    return blocks + [Paragraph(note) for note in notes]
+    return blocks + [Paragraph(note) for note in _notes(leaderboard)]
 
 
 def incomplete_counts(leaderboard: Leaderboard) -> str:
@@ -177,8 +179,11 @@ def _ranking_blocks(leaderboard: Leaderboard) -> list[Block]:
     labels = leaderboard.labels
     # What pools all tasks stands first.
     shown = sorted(leaderboard.shown, key=lambda each: each.errors.measure.unit != PERCENT)
-    blocks: list[Block] = [Heading("Ranking"), Paragraph(_RANKS)]
-    blocks += [standings_table(each, labels) for each in shown]
+    blocks: list[Block] = [
+        Heading("Ranking"),
+        Paragraph(_RANKS),
+        *(standings_table(each, labels) for each in shown),
+    ]
     if leaderboard.by_task:
         blocks.append(tasks_table(leaderboard.by_task, labels))
     if leaderboard.shown and len(leaderboard.shown[-1].rivals) > 1:
@@ -235,8 +240,7 @@ def _spending_blocks(leaderboard: Leaderboard) -> list[Block]:
     for each in shown_standings(leaderboard):
         measure = each.errors.measure
         if not (measure.returning or measure.alone):
-            names = [row.name for row in each.rows]
-            rows = spending(leaderboard.record, measure, names)
+            rows = spending(leaderboard.record, measure, [row.name for row in each.rows])
             name = measure.tasks[0].replace("_", " ")
             title = f"{capital(name)}: whole trials"
             if len(measure.tasks) > 1:

@@ -204,9 +204,11 @@ def profile_plot(every: Sequence[Standings], styles: Styles) -> Plot:
                     markersize=6.5,
                 )
             _logarithmic(axis.xaxis, axis)
-            axis.set_ylim(-2.0, 102.0)
-            axis.set_ylabel("cases (%)")
-            axis.set_xlabel(f"RMSE at most ({errors.measure.unit})")
+            axis.set(
+                ylim=(-2.0, 102.0),
+                ylabel="cases (%)",
+                xlabel=f"RMSE at most ({errors.measure.unit})",
+            )
             axis.set_title(capital(errors.measure.name), loc="left")
         legend_below(canvas, _handles(every, styles), 4)
         return canvas
@@ -238,8 +240,7 @@ def pressure_plot(every: Sequence[Standings], styles: Styles) -> Plot:
                 )
             _logarithmic(axis.yaxis, axis)
             axis.set_xticks(pressures, [f"{p:g}" for p in pressures])
-            axis.set_xlabel("pressure (kPa)")
-            axis.set_ylabel(f"median RMSE ({errors.measure.unit})")
+            axis.set(xlabel="pressure (kPa)", ylabel=f"median RMSE ({errors.measure.unit})")
             axis.set_title(capital(errors.measure.name), loc="left")
         legend_below(canvas, _handles(every, styles), 4)
         return canvas
@@ -297,9 +298,17 @@ def loop_title(conditions: Sequence[Condition]) -> str:
 
 def margin_table(conditions: Sequence[Condition], labels: Labels) -> TextTable:
     """The least margins over the stroke of every controller at every pressure."""
-    header = ["Controller", "Pressure (kPa)", "Gain margin | factor", "Gain margin | dB"]
-    header += ["Phase margin (deg)", "Delay margin (ms)", "Largest sensitivity"]
-    header += ["Crossover (Hz)", "Closed loop"]
+    header = [
+        "Controller",
+        "Pressure (kPa)",
+        "Gain margin | factor",
+        "Gain margin | dB",
+        "Phase margin (deg)",
+        "Delay margin (ms)",
+        "Largest sensitivity",
+        "Crossover (Hz)",
+        "Closed loop",
+    ]
     rows = []
     for name in dict.fromkeys(
         loop.name for condition in conditions for loop in condition.everywhere
@@ -354,8 +363,7 @@ def loop_plot(conditions: Sequence[Condition], styles: Mapping[str, Style]) -> P
         ):
             axis.set_ylabel(label)
         axes[0, 0].set_ylim(-40.0, 60.0)
-        axes[1, 0].set_ylim(-360.0, 0.0)
-        axes[1, 0].set_yticks(range(-360, 1, 90))
+        axes[1, 0].set(ylim=(-360.0, 0.0), yticks=range(-360, 1, 90))
         names = dict.fromkeys(loop.name for c in conditions for loop in c.pictured)
         handles = [
             Line2D([], [], color=styles[n].color, linestyle=styles[n].line, label=styles[n].label)

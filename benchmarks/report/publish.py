@@ -1,7 +1,5 @@
 """`python -m benchmarks report`: writes a suite's leaderboard, as a page and as numbers."""
 
-import csv
-import io
 import shutil
 from collections.abc import Callable
 from functools import partial
@@ -9,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.executors.local import Background
-from benchmarks.files import write_bytes, write_text
+from benchmarks.files import csv_text, write_bytes, write_text
 from benchmarks.report.leaderboard import Leaderboard, read_leaderboard
 from benchmarks.report.page import (
     incomplete_counts,
@@ -114,9 +112,19 @@ def _compute(leaderboard: Leaderboard, progress: OnStep) -> None:
 def numbers_csv(leaderboard: Leaderboard) -> str:
     """A row a controller and measure or task, with all digits; errors in the row's unit."""
     intervals = ("mean", "median", "worst", "to_best", "to_bound")
-    header = ["suite", "version", "measure", "unit", "controller", "cases", "failures"]
-    header += ["best_rank", "worst_rank", "percent_of_range"]
-    header += [f"{name}{end}" for name in intervals for end in ("", "_low", "_high")]
+    header = [
+        "suite",
+        "version",
+        "measure",
+        "unit",
+        "controller",
+        "cases",
+        "failures",
+        "best_rank",
+        "worst_rank",
+        "percent_of_range",
+        *(f"{name}{end}" for name in intervals for end in ("", "_low", "_high")),
+    ]
     suite, rows = leaderboard.suite, []
     every = leaderboard.by_task | leaderboard.standings
     for name, standings in every.items():
@@ -134,8 +142,15 @@ def numbers_csv(leaderboard: Leaderboard) -> str:
 
 def pairs_csv(leaderboard: Leaderboard) -> str:
     """A row a measure and pair of controllers: probability of improvement and ratio."""
-    header = ["suite", "version", "measure", "first", "second", "first_is_better"]
-    header += [f"{name}{end}" for name in ("improvement", "ratio") for end in ("", "_low", "_high")]
+    header = [
+        "suite",
+        "version",
+        "measure",
+        "first",
+        "second",
+        "first_is_better",
+        *(f"{name}{end}" for name in ("improvement", "ratio") for end in ("", "_low", "_high")),
+    ]
     suite = leaderboard.suite
 
     def cells(name: str, pair: Pair) -> list[object]:
@@ -155,12 +170,7 @@ def pairs_csv(leaderboard: Leaderboard) -> str:
 
 def _csv(header: list[str], rows: list[list[Any]]) -> str:
     """Rows as CSV; numbers with all digits, what is unknown empty."""
-    out = io.StringIO(newline="")
-    writer = csv.writer(out, lineterminator="\n")
-    writer.writerow(header)
-    for row in rows:
-        writer.writerow([_cell(value) for value in row])
-    return out.getvalue()
+    return csv_text([header, *(map(_cell, row) for row in rows)])
 
 
 def _cell(value: object) -> object:

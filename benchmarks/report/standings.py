@@ -140,8 +140,7 @@ def _critical(sides: NDArray[np.float64], error: NDArray[np.float64]) -> float:
     varies = error > _NO_SPREAD
     if not varies.any():
         return 0.0
-    largest = np.max(sides[varies] / error[varies][:, None], axis=0)
-    return float(np.quantile(largest, CONFIDENCE))
+    return float(np.quantile(np.max(sides[varies] / error[varies][:, None], axis=0), CONFIDENCE))
 
 
 class Standing(NamedTuple):

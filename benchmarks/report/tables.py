@@ -5,7 +5,7 @@ Costs of tracking: start and steady errors, effort, limits, computing time.
 
 from collections.abc import Mapping, Sequence
 from itertools import combinations
-from typing import NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -20,53 +20,33 @@ MICROSECONDS = 1e6
 """Microseconds in a second."""
 
 
-class Spending(NamedTuple):
-    """Medians over the cases that a controller did not fail in; all NaN if it failed in all.
+def spending(record: SuiteRecord, measure: Measure, names: Sequence[str]) -> list[dict[str, Any]]:
+    """Return the costs of each controller in a measure's tasks.
 
-    Attributes:
-        name: of the controller.
-        cases: how many cases it has.
-        failures: how many of them failed.
-        start: RMSE of the first 0.5 s (the task's unit).
-        steady: RMSE of the rest.
-        largest: largest error of all phases.
-        effort_v: standard deviation of the voltage (V).
-        variation_v_per_s: total variation of the voltage (V/s).
-        saturated_percent: mean share of the control steps at 0 or 10 V (%).
-        clipped_percent: mean share of the control steps whose command, below 0 V or above 10 V,
-            was clipped (%).
-        clipped_v: how far beyond 0-10 V a command of any case was (V).
-        violating_percent: share of the cases that passed a soft limit (%).
-        violation_percent: the largest violation of any case (% of the way to the hard limit).
-        act_us: computing time of `act` (us).
-        act_us_worst: its 99th percentile (us).
-        real_time_factor: how often `act` fits into a control period, at that percentile.
+    Returns:
+        Medians over the cases that a controller did not fail in, all NaN if it failed in all:
+            name: of the controller.
+            cases: how many cases it has.
+            failures: how many of them failed.
+            start: RMSE of the first 0.5 s (the task's unit).
+            steady: RMSE of the rest.
+            largest: largest error of all phases.
+            effort_v: standard deviation of the voltage (V).
+            variation_v_per_s: total variation of the voltage (V/s).
+            saturated_percent: mean share of the control steps at 0 or 10 V (%).
+            clipped_percent: mean share of the control steps whose command, below 0 V or above 10 V,
+                was clipped (%).
+            clipped_v: how far beyond 0-10 V a command of any case was (V).
+            violating_percent: share of the cases that passed a soft limit (%).
+            violation_percent: the largest violation of any case (% of the way to the hard limit).
+            act_us: computing time of `act` (us).
+            act_us_worst: its 99th percentile (us).
+            real_time_factor: how often `act` fits into a control period, at that percentile.
     """
-
-    name: str
-    cases: int
-    failures: int
-    start: float
-    steady: float
-    largest: float
-    effort_v: float
-    variation_v_per_s: float
-    saturated_percent: float
-    clipped_percent: float
-    clipped_v: float
-    violating_percent: float
-    violation_percent: float
-    act_us: float
-    act_us_worst: float
-    real_time_factor: float
-
-
-def spending(record: SuiteRecord, measure: Measure, names: Sequence[str]) -> list[Spending]:
-    """Return the costs of each controller in a measure's tasks."""
     return [_of_one(record, measure, name) for name in names]
 
 
-def _of_one(record: SuiteRecord, measure: Measure, name: str) -> Spending:
+def _of_one(record: SuiteRecord, measure: Measure, name: str) -> dict[str, Any]:
     rows = [
         row
         for (who, episode), row in record.rows.items()
@@ -80,7 +60,7 @@ def _of_one(record: SuiteRecord, measure: Measure, name: str) -> Spending:
     largest = [max(phase["largest_error"] for phase in row["phases"].values()) for row in done]
     worst_us = float(np.median(column("act_us_worst")))
     period_us = MICROSECONDS / record.suite.control_rate_hz
-    return Spending(
+    return dict(
         name=name,
         cases=len(rows),
         failures=len(rows) - len(done),
@@ -111,11 +91,17 @@ def standings_table(standings: Standings, labels: Labels) -> TextTable:
     """Ranks and means of a measure, the best rival first, the bounds last."""
     measure = standings.errors.measure
     unit = measure.unit
-    header = ["Rank", "Controller"]
-    header += [f"Interquartile mean | {unit}", "Interquartile mean | 95 % interval"]
-    header += [] if unit == PERCENT else ["Interquartile mean | % of range"]
-    header += [f"Median ({unit})", f"Worst tenth ({unit})"]
-    header += ["Over the best | ratio", "Over the best | 95 % interval"]
+    header = [
+        "Rank",
+        "Controller",
+        f"Interquartile mean | {unit}",
+        "Interquartile mean | 95 % interval",
+        *([] if unit == PERCENT else ["Interquartile mean | % of range"]),
+        f"Median ({unit})",
+        f"Worst tenth ({unit})",
+        "Over the best | ratio",
+        "Over the best | 95 % interval",
+    ]
     bounded = standings.bound is not None
     header += ["Over the oracle | ratio", "Over the oracle | 95 % interval"] if bounded else []
     rows = [_standing_cells(row, labels, unit, bounded) for row in standings.rows]
@@ -130,9 +116,12 @@ def ranks_table(standings: Sequence[Standings], labels: Labels) -> TextTable:
         standings: the measures; controllers stand in the order of the first.
         labels: what people call the controllers.
     """
-    header = ["Controller"]
-    header += [
-        f"{capital(each.errors.measure.name)} ({each.errors.measure.unit})" for each in standings
+    header = [
+        "Controller",
+        *(
+            f"{capital(each.errors.measure.name)} ({each.errors.measure.unit})"
+            for each in standings
+        ),
     ]
     columns = [{row.name: row for row in each.rows} for each in standings]
     names = dict.fromkeys(name for column in columns for name in column)
@@ -173,12 +162,27 @@ def pair_table(standings: Standings, labels: Labels) -> TextTable:
     rows = []
     for first, second in combinations(names, 2):
         better, ratio = pairs[first, second], pairs[second, first].ratio
-        cells = [labels.get(first, first), labels.get(second, second), figure(ratio.estimate)]
-        cells += [ends(ratio), f"{better.improvement.estimate * cases:g} of {cases}"]
+        cells = [
+            labels.get(first, first),
+            labels.get(second, second),
+            figure(ratio.estimate),
+            ends(ratio),
+            f"{better.improvement.estimate * cases:g} of {cases}",
+        ]
         rows.append([*cells, "**yes**" if better.separated else "no"])
-    header = ["A", "B", "Error of B over that of A | ratio"]
-    header += ["Error of B over that of A | 95 % interval", "A's is smaller (cases)", "Differ"]
-    return TextTable(f"{capital(standings.errors.measure.name)}: pairs", header, rows, words=2)
+    return TextTable(
+        f"{capital(standings.errors.measure.name)}: pairs",
+        [
+            "A",
+            "B",
+            "Error of B over that of A | ratio",
+            "Error of B over that of A | 95 % interval",
+            "A's is smaller (cases)",
+            "Differ",
+        ],
+        rows,
+        words=2,
+    )
 
 
 def _ratio_cells(ratio: Interval | None) -> tuple[str, str]:
@@ -189,25 +193,39 @@ def _ratio_cells(ratio: Interval | None) -> tuple[str, str]:
     return figure(ratio.estimate), ends(ratio)
 
 
-def spending_table(rows: Sequence[Spending], title: str, unit: str, labels: Labels) -> TextTable:
+def spending_table(
+    rows: Sequence[Mapping[str, Any]], title: str, unit: str, labels: Labels
+) -> TextTable:
     """Start and steady errors, effort, limits, computing time."""
-    header = ["Controller", f"RMSE ({unit}) | first 0.5 s", f"RMSE ({unit}) | the rest"]
-    header += [f"Largest error ({unit})", "Effort (V)", "Variation (V/s)", "Saturated (%)"]
-    header += ["Clipped | % of steps", "Clipped | at most by (V)"]
-    header += ["Beyond a soft limit | % of cases", "Beyond a soft limit | at most (%)"]
-    header += ["act (us) | median", "act (us) | 99 %", "Real-time factor", "Failed"]
+    header = [
+        "Controller",
+        f"RMSE ({unit}) | first 0.5 s",
+        f"RMSE ({unit}) | the rest",
+        f"Largest error ({unit})",
+        "Effort (V)",
+        "Variation (V/s)",
+        "Saturated (%)",
+        "Clipped | % of steps",
+        "Clipped | at most by (V)",
+        "Beyond a soft limit | % of cases",
+        "Beyond a soft limit | at most (%)",
+        "act (us) | median",
+        "act (us) | 99 %",
+        "Real-time factor",
+        "Failed",
+    ]
     cells = [
         [
-            labels.get(row.name, row.name),
-            *map(figure, (row.start, row.steady, row.largest)),
-            *map(figure, (row.effort_v, row.variation_v_per_s)),
-            _short(row.saturated_percent),
-            _short(row.clipped_percent),
-            figure(row.clipped_v),
-            _short(row.violating_percent),
-            _short(row.violation_percent),
-            *map(figure, (row.act_us, row.act_us_worst, row.real_time_factor)),
-            f"{row.failures} of {row.cases}",
+            labels.get(row["name"], row["name"]),
+            *map(figure, (row["start"], row["steady"], row["largest"])),
+            *map(figure, (row["effort_v"], row["variation_v_per_s"])),
+            _short(row["saturated_percent"]),
+            _short(row["clipped_percent"]),
+            figure(row["clipped_v"]),
+            _short(row["violating_percent"]),
+            _short(row["violation_percent"]),
+            *map(figure, (row["act_us"], row["act_us_worst"], row["real_time_factor"])),
+            f"{row['failures']} of {row['cases']}",
         ]
         for row in rows
     ]
@@ -273,8 +291,12 @@ def obstacle_table(
         ]
         rows.append([task, f"{kpa:g}", why, f"{errors.measure.name} ({errors.measure.unit})"])
         rows[-1] += cells
-    header = ["Task", "Pressure (kPa)", "Why", "Mean error of", "Oracle", "Best rival"]
-    return TextTable("Obstacles", header, rows, words=4)
+    return TextTable(
+        "Obstacles",
+        ["Task", "Pressure (kPa)", "Why", "Mean error of", "Oracle", "Best rival"],
+        rows,
+        words=4,
+    )
 
 
 def _leaders(standings: Standings) -> tuple[int | None, int | None]:
@@ -294,8 +316,9 @@ def verdict_table(checks: Sequence[Verdict]) -> TextTable:
         ]
         for check in checks
     ]
-    header = ["What", "Target", "This run", "95 % interval", "Verdict"]
-    return TextTable("What the suite asks for", header, rows)
+    return TextTable(
+        "What the suite asks for", ["What", "Target", "This run", "95 % interval", "Verdict"], rows
+    )
 
 
 def failure_table(record: SuiteRecord, labels: Labels) -> TextTable:
@@ -311,8 +334,12 @@ def failure_table(record: SuiteRecord, labels: Labels) -> TextTable:
         ]
         for (name, reason), cases in groups.items()
     ]
-    header = ["Controller", "Case (station/task/kPa/repeat)", "Why"]
-    return TextTable("Cases without figures", header, rows, words=3)
+    return TextTable(
+        "Cases without figures",
+        ["Controller", "Case (station/task/kPa/repeat)", "Why"],
+        rows,
+        words=3,
+    )
 
 
 def capital(text: str) -> str:

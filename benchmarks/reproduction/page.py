@@ -73,8 +73,7 @@ def _opening(results: Results) -> list[Block]:
         parts.append("**This is a selection, not the suite as it is frozen.**")
     if results.failures:
         parts.append(f"**{len(results.failures)} of {count} cases failed**; see the end.")
-    title = f"pma-gym benchmark: {suite.name}"
-    return [Heading(title, 1), *(Paragraph(part) for part in parts)]
+    return [Heading(f"pma-gym benchmark: {suite.name}", 1), *(Paragraph(part) for part in parts)]
 
 
 def _task_blocks(results: Results, task: str, model: str) -> list[Block]:

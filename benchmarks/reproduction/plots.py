@@ -61,10 +61,12 @@ def rmse_plot(results: Results, task: str) -> Plot:
         axes[0, 0].yaxis.set_major_formatter("{x:g}")
         axes[-1, 0].set_xticks(pressures, [f"{p:g}" for p in pressures])
         axes[-1, 0].set_xlabel("pressure (kPa)")
-        handles = [Line2D([], [], label="Measured", **MEASURED)]
-        handles += [
-            Line2D([], [], color=style.color, marker=style.marker, label=style.label)
-            for style in styles.values()
+        handles = [
+            Line2D([], [], label="Measured", **MEASURED),
+            *(
+                Line2D([], [], color=style.color, marker=style.marker, label=style.label)
+                for style in styles.values()
+            ),
         ]
         if "III" in phases and results.bounds:
             handles.append(Line2D([], [], label="Achievable bound", **BOUND))
@@ -95,8 +97,7 @@ def replay_plot(results: Results) -> Plot:
             axes[-1, column].set_xlabel("pressure (kPa)")
         figure.align_ylabels()
         mean = Line2D([], [], color=_GREY, linestyle=(0, (4, 2)), label="mean over the trials")
-        bars = Patch(color=color, label="simulated less measured")
-        legend_below(figure, [bars, mean], 2)
+        legend_below(figure, [Patch(color=color, label="simulated less measured"), mean], 2)
         return figure
 
 
@@ -123,10 +124,10 @@ def tracking_plot(results: Results, task: str) -> Plot:
             panels[-1].set_xlabel("time (s)")
         axes[0, 0].set_ylabel(f"{LABELS[task]} ({unit})")
         axes[1, 0].set_ylabel(f"actual − ideal ({unit})")
-        axes[2, 0].set_ylabel(f"actual − ideal ({unit}),\nenlarged")
-        axes[2, 0].set_ylim(-_ENLARGED[task], _ENLARGED[task])
-        axes[3, 0].set_ylabel("motor voltage (V)")
-        axes[3, 0].set_ylim(0.0, None)
+        axes[2, 0].set(
+            ylabel=f"actual − ideal ({unit}),\nenlarged", ylim=(-_ENLARGED[task], _ENLARGED[task])
+        )
+        axes[3, 0].set(ylabel="motor voltage (V)", ylim=(0.0, None))
         figure.align_ylabels()
         legend_below(figure, _handles(styles), 3)
         return figure
@@ -234,8 +235,14 @@ def rmse_figure(results: Results, task: str) -> InteractiveFigure:
         if phase == "III" and results.bounds:
             values = [results.bounds.get(p, nan) for p in pressures]
             traces.append(Trace("Achievable bound", pressures, values, view=view))
-    caption = f"RMSE by pressure, on a logarithmic scale. {_HOW}"
-    return InteractiveFigure(f"rmse-{task}", caption, "pressure (kPa)", "", traces, True)
+    return InteractiveFigure(
+        f"rmse-{task}",
+        f"RMSE by pressure, on a logarithmic scale. {_HOW}",
+        "pressure (kPa)",
+        "",
+        traces,
+        True,
+    )
 
 
 def tracking_figure(results: Results, task: str) -> InteractiveFigure:
@@ -266,8 +273,13 @@ def replay_figure(results: Results) -> InteractiveFigure:
                 x = [trial.pressure_kpa for trial in trials]
                 y = [getattr(trial, quantity) for trial in trials]
                 traces.append(Trace(name, x, y, _PHASES[phase], view=f"{task}: {label}"))
-    caption = f"Simulated less measured, trial by trial. {_HOW}"
-    return InteractiveFigure("replay-errors", caption, "pressure (kPa)", "", traces)
+    return InteractiveFigure(
+        "replay-errors",
+        f"Simulated less measured, trial by trial. {_HOW}",
+        "pressure (kPa)",
+        "",
+        traces,
+    )
 
 
 def _trial_traces(results: Results, task: str, pressure: float, points: int) -> Iterator[Trace]:

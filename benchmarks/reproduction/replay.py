@@ -60,8 +60,7 @@ def replay_errors(results: Results, model: str, task: str, phase: str) -> list[R
     """Errors of the replay on a model, trial by trial; failed cases are left out."""
     errors = []
     for pressure in results.suite.pressures_kpa.get(task, ()):
-        replay = results.suite.goals.replay
-        simulated = results.phase(model, replay, task, pressure, phase)
+        simulated = results.phase(model, results.suite.goals.replay, task, pressure, phase)
         if simulated is not None:
             measured = measured_score(task, phase, pressure)
             errors.append(ReplayError(task, phase, pressure, *_difference(simulated, measured)))
@@ -126,8 +125,7 @@ def _rotation_profile(pressure_kpa: float) -> np.ndarray:
     for number in range(13, 21):
         table = load_table(f"I{number}")
         if float(table["pressure_kpa"][0]) == pressure_kpa:
-            holding_phase = (table["time_s"] >= 5.0) & (table["time_s"] < 10.0)
-            return table["motor_voltage_v"][holding_phase]
+            return table["motor_voltage_v"][(table["time_s"] >= 5.0) & (table["time_s"] < 10.0)]
     raise KeyError(f"no rotation trial at {pressure_kpa:g} kPa")
 
 

@@ -31,8 +31,10 @@ def parts_table(results: Results, task: str, phase: str) -> TextTable:
     ]
     known = [score for score in simulated if score is not None]
     means = ["mean", *_means(measured), *(_means(known) if known else [""] * len(PARTS))]
-    header = ["Pressure (kPa)"]
-    header += [f"{who} | {name} ({unit})" for who in ("Measured", "Simulated") for name in _NAMES]
+    header = [
+        "Pressure (kPa)",
+        *(f"{who} | {name} ({unit})" for who in ("Measured", "Simulated") for name in _NAMES),
+    ]
     part = "Displacement" if task == phase else f"Rotation, phase {phase}"
     return TextTable(f"{part}: the two parts of the RMSE", header, [*rows, RULE, means])
 
@@ -131,12 +133,12 @@ def _against_simple_prediction(results: Results, errors: Sequence[ReplayError]) 
         ]
         for name, unit in _UNITS.items()
     ]
-    title = (
+    return TextTable(
         f"Displacement, {means.trials} trials, beside the simple prediction "
-        "(table I3 read at the printed voltages, lagged by 2.90/K)"
+        "(table I3 read at the printed voltages, lagged by 2.90/K)",
+        ["", "Mean error", "Mean absolute error", "Simple prediction", "Difference"],
+        rows,
     )
-    header = ["", "Mean error", "Mean absolute error", "Simple prediction", "Difference"]
-    return TextTable(title, header, rows)
 
 
 def _hold_blocks(results: Results, errors: Sequence[ReplayError]) -> list[Block]:
@@ -156,8 +158,14 @@ def _hold_blocks(results: Results, errors: Sequence[ReplayError]) -> list[Block]
                 f"{angle - measured:+.1f}",
             ]
         )
-    header = ["Pressure (kPa)", "Measured (deg)", "Simulated (deg)", "Table I3 (deg)"]
-    header += ["Simulated less measured", "I3 less measured"]
+    header = [
+        "Pressure (kPa)",
+        "Measured (deg)",
+        "Simulated (deg)",
+        "Table I3 (deg)",
+        "Simulated less measured",
+        "I3 less measured",
+    ]
     title = "Rotation held in phase II: mean angle (* beyond the table's 8.45 V, drawn on)"
     simulated = fmean(error.mean for error in errors)
     tabled = fmean(table_errors)

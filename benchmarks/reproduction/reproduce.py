@@ -15,7 +15,7 @@ from benchmarks.executors.executor import Executor, run_all
 from benchmarks.files import write_bytes, write_text
 from benchmarks.reproduction.page import report_blocks, report_pictures
 from benchmarks.reproduction.replay import all_replay_errors
-from benchmarks.reproduction.results import Results, Score, csv_text, json_text, scores_of
+from benchmarks.reproduction.results import Results, Score, json_text, scores_csv, scores_of
 from benchmarks.reproduction.rotation_reading import entries
 from benchmarks.reproduction.tables import summary_table
 from benchmarks.reproduction.targets import Check, check_targets
@@ -84,7 +84,7 @@ def write_report(results: Results, out: Path, vector: bool = False) -> None:
     texts = {
         "report.md": to_markdown(blocks, pictures, PLOTS),
         "report.html": to_html(blocks, pictures),
-        "scores.csv": csv_text(results.scores),
+        "scores.csv": scores_csv(results.scores),
         "scores.json": json_text(
             results,
             targets=[asdict(check) | {"verdict": check.verdict} for check in checks],
@@ -235,8 +235,7 @@ def _reported(
     with console.status("driving the trials that are drawn, computing the achievable bounds"):
         results = _results(suite, run, out, executor)
     run.finish(out)
-    info = {**results.info, "wall_time_s": run.info["wall_time_s"]}
-    results = replace(results, info=info)
+    results = replace(results, info={**results.info, "wall_time_s": run.info["wall_time_s"]})
     with console.status("writing the report"):
         write_report(results, out)
     return results

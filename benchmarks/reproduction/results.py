@@ -1,7 +1,5 @@
 """Results of a run, as rows and as files that appear whole or not at all."""
 
-import csv
-import io
 import json
 import math
 from collections.abc import Iterable, Mapping, Sequence
@@ -9,6 +7,7 @@ from dataclasses import asdict, dataclass, field, fields
 from functools import cached_property
 from typing import Any
 
+from benchmarks.files import csv_text
 from benchmarks.runner.case import Case, Row, cases
 from benchmarks.runner.execution import identity, row_identity
 from benchmarks.runner.phase_score import PHASES, UNITS, PhaseScore, measured_score
@@ -134,21 +133,19 @@ class Results:
         }
 
 
-def csv_text(scores: Iterable[Score]) -> str:
+def scores_csv(scores: Iterable[Score]) -> str:
     """A row for each phase of each case; a failed case has one row with its failure."""
-    out = io.StringIO(newline="")
-    writer = csv.writer(out, lineterminator="\n")
-    writer.writerow(CSV_COLUMNS)
+    cells: list[Sequence[object]] = [CSV_COLUMNS]
     for score in scores:
         model, controller, task, pressure = score.key
         head = [model, controller, task, f"{pressure:g}"]
         for phase, figures in score.phases.items():
             row = [*head, phase, UNITS[task], score.seed]
-            writer.writerow([*row, *(repr(getattr(figures, name)) for name in FIGURES), ""])
+            cells.append([*row, *(repr(getattr(figures, name)) for name in FIGURES), ""])
         if score.failure:
             blank = [""] * len(FIGURES)
-            writer.writerow([*head, "", UNITS[task], score.seed, *blank, score.failure])
-    return out.getvalue()
+            cells.append([*head, "", UNITS[task], score.seed, *blank, score.failure])
+    return csv_text(cells)
 
 
 def json_text(results: Results, **more: object) -> str:

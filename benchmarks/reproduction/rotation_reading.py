@@ -84,8 +84,9 @@ GAP_DEG = 20.0
 
 def declared(plant: Plant) -> RotationReading:
     """The declared reading, with the slack that a plant has to be freed of."""
-    slack = plant.model.parameters["cable"].slack
-    return RotationReading(DECODED_DEG_PER_V, CALIBRATED_DEG_PER_V, GAP_DEG, slack)
+    return RotationReading(
+        DECODED_DEG_PER_V, CALIBRATED_DEG_PER_V, GAP_DEG, plant.model.parameters["cable"].slack
+    )
 
 
 def rotation_trial(plant: Plant, table: str) -> Trial:
@@ -101,8 +102,9 @@ def rotation_trial(plant: Plant, table: str) -> Trial:
     pressure = float(printed["pressure_kpa"][0]) * SI_FACTORS["kPa"]
     volts = np.interp(time, printed["time_s"], printed["motor_voltage_v"])
     regulator = np.full(samples, plant.regulator_voltage(pressure))
-    commands = {"motor_voltage": volts, "regulator_voltage": regulator}
-    return plant.simulate(Trial(time, commands), noise=False)
+    return plant.simulate(
+        Trial(time, {"motor_voltage": volts, "regulator_voltage": regulator}), noise=False
+    )
 
 
 def read_trial(trial: Trial, reading: RotationReading, radius: float) -> Trial:
@@ -233,8 +235,9 @@ def reading_table(trials: list[ReadTrial]) -> TextTable:
     for phase in PHASES["rotation"]:
         header += [f"{phase} | {who} (deg)" for who in ("measured", "plain", "as read")]
     plain, read = (mean_absolute_error(trials, each) for each in (False, True))
-    title = (
+    return TextTable(
         f"Table 30's RMSE: mean absolute error {plain:.2f} deg plain, {read:.2f} deg through the "
-        "declared reading"
+        "declared reading",
+        header,
+        rows,
     )
-    return TextTable(title, header, rows)

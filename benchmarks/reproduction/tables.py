@@ -45,8 +45,11 @@ def summary_table(results: Results) -> TextTable:
                 failed = len(known) < len(pressures)
                 cell = MISSING if failed else f"{fmean(known):.3g} ({max(known):.3g})"
                 rows.setdefault(who, []).append(cell)
-    title = f"RMSE on {main}: mean (largest) over the pressures"
-    return TextTable(title, header, [[who, *cells] for who, cells in rows.items()])
+    return TextTable(
+        f"RMSE on {main}: mean (largest) over the pressures",
+        header,
+        [[who, *cells] for who, cells in rows.items()],
+    )
 
 
 def rmse_table(results: Results, model: str, task: str, phase: str) -> TextTable:
@@ -55,8 +58,7 @@ def rmse_table(results: Results, model: str, task: str, phase: str) -> TextTable
     who = columns(results, model, task, phase)
     pressures = results.suite.pressures_kpa[task]
     bounded = phase == "III" and model == results.suite.models[0] and bool(results.bounds)
-    header = ["Pressure (kPa)"]
-    header += [f"{name} | {part}" for name in who for part in (unit, "%")]
+    header = ["Pressure (kPa)", *(f"{name} | {part}" for name in who for part in (unit, "%"))]
     rows = [
         [f"{p:g}", *(text for figures in who.values() for text in _rmse_cells(figures(p)))]
         for p in pressures
@@ -72,8 +74,11 @@ def rmse_table(results: Results, model: str, task: str, phase: str) -> TextTable
         rows = [[*row, _number(b, 3)] for row, b in zip(rows, bounds, strict=True)]
         mean.append(_mean(bounds))
     number, part = ("22", "") if task == "displacement" else ("30", f", phase {phase}")
-    title = f"Table {number}{part}: RMSE against the ideal, and in percent of the range"
-    return TextTable(title, header, [*rows, RULE, mean])
+    return TextTable(
+        f"Table {number}{part}: RMSE against the ideal, and in percent of the range",
+        header,
+        [*rows, RULE, mean],
+    )
 
 
 def regression_table(results: Results, model: str, task: str, phase: str) -> TextTable:
@@ -86,16 +91,19 @@ def regression_table(results: Results, model: str, task: str, phase: str) -> Tex
         rows.append([f"{pressure:g}", f"intercept ({unit})", *map(_intercept, scores)])
         rows.append(["", f"slope ({unit}/s)", *map(_slope, scores)])
     part = "" if task == "displacement" else f", phase {phase}"
-    title = f"Table {REGRESSION_TABLES[phase]}{part}: line through the trial (standard error)"
-    return TextTable(title, ["Pressure (kPa)", "Term", *who], rows, words=2)
+    return TextTable(
+        f"Table {REGRESSION_TABLES[phase]}{part}: line through the trial (standard error)",
+        ["Pressure (kPa)", "Term", *who],
+        rows,
+        words=2,
+    )
 
 
 def replay_table(errors: Sequence[ReplayError]) -> TextTable:
     """Signed errors of the replay in one phase, trial by trial, and their means."""
     unit = UNITS[errors[0].task]
     means = summarise(errors)
-    header = ["Pressure (kPa)", f"slope ({unit}/s)"]
-    header += [f"{name} ({unit})" for name in REPLAY_NAMES]
+    header = ["Pressure (kPa)", f"slope ({unit}/s)", *(f"{name} ({unit})" for name in REPLAY_NAMES)]
     rows = [
         [f"{error.pressure_kpa:g}", *(f"{getattr(error, name):+.3f}" for name in QUANTITIES)]
         for error in errors
@@ -104,8 +112,7 @@ def replay_table(errors: Sequence[ReplayError]) -> TextTable:
     absolute = ["mean absolute", *(f"{means.absolute[name]:.3f}" for name in QUANTITIES)]
     phase = errors[0].phase
     part = "Displacement" if phase == "displacement" else f"Rotation, phase {phase}"
-    title = f"{part}: simulated less measured"
-    return TextTable(title, header, [*rows, RULE, signed, absolute])
+    return TextTable(f"{part}: simulated less measured", header, [*rows, RULE, signed, absolute])
 
 
 def _rmse_cells(score: PhaseScore | None) -> tuple[str, str]:

@@ -83,8 +83,9 @@ def target_table(checks: Iterable[Check], model: str) -> TextTable:
         ]
         for check in checks
     ]
-    header = ["What", "Target", "This run", "Verdict"]
-    return TextTable(f"What the suite asks for, on {model}", header, rows)
+    return TextTable(
+        f"What the suite asks for, on {model}", ["What", "Target", "This run", "Verdict"], rows
+    )
 
 
 def _replay_checks(results: Results) -> list[Check]:

@@ -131,8 +131,9 @@ def drive(case: Case, model: Model | None = None) -> tuple[Rollout, PMAEnv]:
 def _figures(done: Rollout, environment: PMAEnv) -> Row:
     actuator = 1 if done.task.actuator == "regulator" else 0
     measured = Measured(done.position, done.commands[:, actuator], done.truth, done.act_seconds)
-    limits = environment.plant.model.parameters["limits"]
-    row = figures(done.task, measured, done.period, limits).to_json()
+    row = figures(
+        done.task, measured, done.period, environment.plant.model.parameters["limits"]
+    ).to_json()
     if done.task.exercise is None:
         return row
     summary = environment.episode_summary()

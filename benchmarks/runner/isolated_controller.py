@@ -121,8 +121,7 @@ def probe(spec: ControllerSpec) -> str:
     Raises:
         ControllerError: it cannot be made.
     """
-    made = spec.make()
-    name = getattr(made, "name", "")
+    name = getattr(spec.make(), "name", "")
     return name.strip() if isinstance(name, str) else ""
 
 
@@ -224,8 +223,7 @@ class Isolated:
         self._source = spec.source
         self.act_seconds: list[float] = []
         make = partial(_make, spec, period, keep_pace)
-        making = f"importing and making {spec.name}"
-        self.name, self.repetitions = self._ask(make, making, MAKE_S)
+        self.name, self.repetitions = self._ask(make, f"importing and making {spec.name}", MAKE_S)
 
     def reset(self, reference: Reference, station: StationInfo) -> None:
         """Its `reset`."""
@@ -285,5 +283,4 @@ def _reset(reference: Reference, station: StationInfo) -> None:
 
 def _act(measurement: Measurement, now: float) -> tuple[float, float]:
     began = time.perf_counter()
-    answer = _controller.act(measurement, now)
-    return checked_volts(answer, now), time.perf_counter() - began
+    return checked_volts(_controller.act(measurement, now), now), time.perf_counter() - began

@@ -8,12 +8,13 @@ import os
 from collections.abc import Callable, Iterator
 from dataclasses import fields
 from pathlib import Path
+from typing import Any
 
 from benchmarks.files import say_damaged
 from benchmarks.runner.case import Row
 from benchmarks.runner.phase_score import PhaseScore
 from benchmarks.suites.suite import SuiteError
-from pma_gym.document_shape import Maybe, Real, ShapeError, Whole, check_shape
+from pma_gym.document_shape import Maybe, Real, Whole, check_shape
 from pma_gym.documents import parse_json
 from pma_gym.files import replace_file
 from pma_gym.limits import limit
@@ -67,7 +68,7 @@ class Journal:
     """Appends rows to a file, each flushed whole.
 
     Several processes may append to one file: the system puts every write at its end. A line that a
-    crash tore is closed before the next one, and `read_rows` passes over it.
+    crash tore is closed before the next one, and `case_rows` passes over it.
 
     Args:
         path: the file; made with its folder if it is not there.
@@ -149,41 +150,28 @@ def rewrite(path: Path, stays: Callable[[bytes], bool]) -> int:
     return len(lines) - len(kept)
 
 
-def read_rows(path: Path) -> Iterator[Row]:
+def case_rows(path: Path) -> Iterator[Row]:
     """The rows of a journal, in the order in which they came; none if there is no file.
 
-    What is no whole row, as a line that a crash tore, is passed over: its case counts as not run,
-    and one line on standard error says so.
+    A line that is no whole row, as one that a crash tore, is passed over: its case counts as not
+    run, and one line on standard error says so.
     """
     damaged: list[str] = []
     for number, line in enumerate(_lines(path), start=1):
         if not line.strip():
             continue
         try:
-            row = parse_json(line, f"line {number}", own=True)
-        except ValueError as error:
-            damaged.append(str(error))
-            continue
-        if isinstance(row, dict):
-            yield row
-        else:
-            damaged.append(f"line {number} is no row")
-    _say_damaged(path, damaged)
-
-
-def case_rows(path: Path) -> Iterator[Row]:
-    """Read rows as `read_rows` does, only those of cases, with figures or a failure."""
-    damaged: list[str] = []
-    for number, row in enumerate(read_rows(path), start=1):
-        try:
+            row: Any = parse_json(line, "the row", own=True)
             check_shape(row, _ROW)
             if not row["failure"]:
                 check_shape(row, _FIGURES)
-        except ShapeError as error:
-            damaged.append(f"row {number}: {error}")
+        except ValueError as error:
+            damaged.append(f"line {number}: {error}")
             continue
         yield row
-    _say_damaged(path, damaged)
+    if damaged:
+        more = f" and {len(damaged) - 1} more" if len(damaged) > 1 else ""
+        say_damaged(path, f"{damaged[0]}{more}", "those cases count as not run, the others stay")
 
 
 def _lines(path: Path) -> Iterator[bytes]:
@@ -192,9 +180,3 @@ def _lines(path: Path) -> Iterator[bytes]:
         most = limit("document_kib") * 1024
         with path.open("rb") as file:
             yield from iter(lambda: file.readline(most), b"")
-
-
-def _say_damaged(path: Path, damaged: list[str]) -> None:
-    if damaged:
-        more = f" and {len(damaged) - 1} more" if len(damaged) > 1 else ""
-        say_damaged(path, f"{damaged[0]}{more}", "those cases count as not run, the others stay")

@@ -63,8 +63,7 @@ class Peer:
         """What the stamp says if the installation is that of these pins."""
         texts = [self.pins.read_text(encoding="utf-8")] if self.pinned else []
         if self.project is not None:
-            project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
-            asked = project["project"]
+            asked = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
             texts += [(ROOT / "constraints.txt").read_text(encoding="utf-8")]
             texts += asked["dependencies"] + asked["optional-dependencies"].get(self.project, [])
         return hashlib.sha256("\0".join(texts).encode()).hexdigest()[:16]
@@ -196,9 +195,18 @@ def _sizes(
 
 
 def _rollouts() -> Iterator[Row]:
-    toy = {"name": "Pendulum-v1", "count": 8}
-    yield Row("rollouts/Pendulum/8", "PPO rollouts, 8 copies of Pendulum-v1", SB3, "rollouts", toy)
+    yield Row(
+        "rollouts/Pendulum/8",
+        "PPO rollouts, 8 copies of Pendulum-v1",
+        SB3,
+        "rollouts",
+        {"name": "Pendulum-v1", "count": 8},
+    )
     for count in (64, 256):
-        title = f"PPO rollouts, pma-gym, batch of {count}"
-        settings = {"name": DISPLACEMENT, "count": count, "n_steps": 128}
-        yield Row(f"rollouts/own/{count}", title, SB3, "rollouts", settings)
+        yield Row(
+            f"rollouts/own/{count}",
+            f"PPO rollouts, pma-gym, batch of {count}",
+            SB3,
+            "rollouts",
+            {"name": DISPLACEMENT, "count": count, "n_steps": 128},
+        )

@@ -111,8 +111,7 @@ def run_speed(
         code = INTERRUPTED
         console.print("Interrupted: what follows is what was measured so far.")
     _print(rows, rates, absences, console)
-    verdicts = [(target, ratio(target, rates)) for target in targets]
-    missed = _judge(verdicts, console)
+    missed = _judge([(target, ratio(target, rates)) for target in targets], console)
     if json_file is not None and code == DONE:
         content = environment_info() | {"rounds": rounds, "seconds": seconds}
         write_text(json_file, json.dumps(content | {"per_second": rates, "absent": absences}))

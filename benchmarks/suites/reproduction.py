@@ -115,8 +115,7 @@ class ReproductionSuite(FrozenSuite):
         Cases share no noise, and adding a case leaves the others unchanged.
         """
         name = self.case_name(episode, controller)
-        digest = hashlib.sha256(f"{self.seed}:{name}".encode()).digest()
-        return int.from_bytes(digest[:4], "big")
+        return int.from_bytes(hashlib.sha256(f"{self.seed}:{name}".encode()).digest()[:4], "big")
 
     def case_name(self, episode: Episode, controller: str) -> str:
         """Return a case's unique name, wherever its files lie: `station/pid/rotation/300`."""

@@ -242,16 +242,21 @@ def draw_station(recipe: Recipe, number: int) -> DrawnStation:
     Raises:
         RecipeError: no draw could do the tasks.
     """
-    bits = np.random.Philox(np.random.SeedSequence([recipe.seed, number]))
-    generator = np.random.Generator(bits)
+    generator = np.random.Generator(np.random.Philox(np.random.SeedSequence([recipe.seed, number])))
     refused: list[str] = []
     for _ in range(ATTEMPTS):
         model, present = _drawn(recipe, generator)
         why = inability(model, recipe)
         if not why:
-            name = f"{recipe.model}-{number}"
-            title = f"{recipe.model}, drawn with seed {recipe.seed}: number {number}"
-            return DrawnStation(replace(model, name=name, title=title), present, tuple(refused))
+            return DrawnStation(
+                replace(
+                    model,
+                    name=f"{recipe.model}-{number}",
+                    title=f"{recipe.model}, drawn with seed {recipe.seed}: number {number}",
+                ),
+                present,
+                tuple(refused),
+            )
         refused.append(why)
     raise RecipeError(
         f"none of {ATTEMPTS} draws of station {number} could do the tasks, the last one: "

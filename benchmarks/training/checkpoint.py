@@ -21,7 +21,7 @@ REPLAYED = ("observations", "next_observations", "actions", "rewards", "dones", 
 """Arrays of the replayed transitions."""
 
 
-class CheckpointError(RuntimeError):
+class CheckpointError(ValueError):
     """A checkpoint that cannot be saved or used; the message says why and what remains."""
 
 

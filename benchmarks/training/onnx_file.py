@@ -47,8 +47,9 @@ def _model(onnx: Any, policy: PolicyFile) -> Any:  # noqa: ANN401 - the optional
     weights = policy.weights
     for i, (weight, bias) in enumerate(weights.layers):
         constants |= {f"weight_{i}": weight, f"bias_{i}": bias}
-        inputs = [entry, f"weight_{i}", f"bias_{i}"]
-        nodes.append(helper.make_node("Gemm", inputs, [f"sum_{i}"], transB=1))
+        nodes.append(
+            helper.make_node("Gemm", [entry, f"weight_{i}", f"bias_{i}"], [f"sum_{i}"], transB=1)
+        )
         last = i == len(weights.layers) - 1
         entry = "action" if last else f"value_{i}"
         nodes.append(_node_after(helper, weights.output if last else weights.activation, i, entry))

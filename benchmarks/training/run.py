@@ -253,6 +253,7 @@ class _Watch(BaseCallback):
                 self.best = copy.deepcopy(self.model.policy.state_dict())
         self.curve.append(point)
         content = {"order": self._to_json(), "curve": self.curve}
-        tensors = {"best": self.best, "average": self.average.weights}
-        save_checkpoint(self._path, self.model, content, tensors)
+        save_checkpoint(
+            self._path, self.model, content, {"best": self.best, "average": self.average.weights}
+        )
         self._on_progress(point.steps, point)

@@ -51,8 +51,7 @@ class Stations:
         Its model is the nominal one with every effect that a station may have, neutral.
         """
         effects = {effect.name: {} for effect in self.recipe.effects}
-        model = load_model(self.recipe.model).with_effects(effects)
-        return {"randomisation": self, "model": model}
+        return {"randomisation": self, "model": load_model(self.recipe.model).with_effects(effects)}
 
     def __call__(self, nominal: Model, generator: np.random.Generator) -> Model:
         """The station of an episode."""

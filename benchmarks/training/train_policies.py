@@ -208,8 +208,9 @@ def run_train(order: Order, out: Path, console: Console, ship: bool = False) -> 
                 progress.console.print(f"{at}   validation {point.error:.4g} {unit}{broken}")
 
         model, curve, best = train(order, out, on_progress)
-    activation = model.policy.activation_fn.__name__
-    weights = weights_from_state(preset.algorithm, model.policy.state_dict(), activation)
+    weights = weights_from_state(
+        preset.algorithm, model.policy.state_dict(), model.policy.activation_fn.__name__
+    )
     policy = policy_of(preset, order.seed, weights, model.num_timesteps, curve, best)
     path = save_policy(policy, out, ship)
     console.print(

@@ -10,9 +10,8 @@ import numpy as np
 
 from benchmarks.tuning.loop_margins import Job, Loop
 from controllers.design.designs import Gains
-from controllers.feedforward_pid import FeedforwardPID
 from controllers.models.nominal_motion import NominalMotion, nominal_motion
-from controllers.pid import PID
+from controllers.pid import PID, FeedforwardPID
 from controllers.registry import Reference
 from pma_gym.effects.effect import Value
 from pma_gym.envs import PMAEnv, StationInfo

@@ -101,15 +101,15 @@ class KeptRows:
     def __init__(self, out: Path, made_with: dict[str, Any]) -> None:
         self.path = out.with_name(f"{out.stem}.partial.json")
         # As JSON gives it back, so that the two can be compared.
-        provenance = made_with | {"commit": git_state(ROOT)["commit"]}
-        self.made_with = json.loads(json.dumps(provenance))
+        self.made_with = json.loads(json.dumps(made_with | {"commit": git_state(ROOT)["commit"]}))
         self.rows = self._read()
 
     def keep(self, row: Job, result: tuple[Gains, float]) -> None:
         """Add a row that is done, on disk too."""
         self.rows[name_of(row)] = result
-        document = {"made_with": self.made_with, "rows": self.rows}
-        write_text(self.path, json.dumps(document, indent=1) + "\n")
+        write_text(
+            self.path, json.dumps({"made_with": self.made_with, "rows": self.rows}, indent=1) + "\n"
+        )
 
     def forget(self) -> None:
         """Remove the file: the whole table is written."""
@@ -262,13 +262,11 @@ class Loop:
         systems = [sampled(place, station) for place in places]
         self.shares = [place.share for place in places]
         self.plants = [tuple(map(np.asarray, (s.A, s.B, s.C))) for s in systems]
-        corners = np.linspace(0.0, math.pi, 301)[1:]
-        self.z = np.exp(1j * corners)
+        self.z = np.exp(1j * np.linspace(0.0, math.pi, 301)[1:])
         self.responses = [self._response(*plant) for plant in self.plants]
 
     def _response(self, a: np.ndarray, b: np.ndarray, c: np.ndarray) -> np.ndarray:
-        inverse = np.linalg.inv(self.z[:, None, None] * np.eye(len(a)) - a)
-        return (c @ inverse @ b)[:, 0, 0]
+        return (c @ np.linalg.inv(self.z[:, None, None] * np.eye(len(a)) - a) @ b)[:, 0, 0]
 
     def sensitivity(self, gains: Gains) -> float:
         """Largest sensitivity |1 / (1 + C G)| over all places; infinite if one is unstable."""

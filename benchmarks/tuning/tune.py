@@ -52,8 +52,7 @@ from controllers.design.designs import (
     column_names,
     read_settings,
 )
-from controllers.feedforward_pid import FeedforwardPID
-from controllers.pid import PID
+from controllers.pid import PID, FeedforwardPID
 from pma_gym.document_shape import check_shape
 from pma_gym.plant.model import Model, dump_model, load_model
 from pma_gym.plant.plant import Plant
@@ -119,8 +118,7 @@ def run_tune(
         done = sum(name_of(row) in kept.rows for row in rows)
         print(_interrupted(done, len(rows), kept.path, out), file=sys.stderr)
         return False
-    tables = _tables(rows, [kept.rows[name_of(row)] for row in rows])
-    for loop, kinds in tables.items():
+    for loop, kinds in _tables(rows, [kept.rows[name_of(row)] for row in rows]).items():
         for kind, controllers in kinds.items():
             table = {"provenance": _provenance(known, seed)} | controllers
             document.setdefault(known.name, {}).setdefault(loop, {})[kind] = table
@@ -235,8 +233,10 @@ def _tables(jobs: list[Job], results: list[tuple[Gains, float]]) -> dict[str, An
 def _provenance(model: Model, seed: int) -> str:
     """What gains depend on, in one line."""
     digest = hashlib.sha256(dump_model(model).encode()).hexdigest()[:16]
-    versions = [f"Python {platform.python_version()}"]
-    versions += [f"{name} {version(name)}" for name in ("numpy", "scipy", "llvmlite")]
+    versions = [
+        f"Python {platform.python_version()}",
+        *(f"{name} {version(name)}" for name in ("numpy", "scipy", "llvmlite")),
+    ]
     return f"tuned on the model {digest}, seed {seed}; {' '.join(versions)}"
 
 

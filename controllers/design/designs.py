@@ -65,8 +65,12 @@ def designed(
     known = [name for name, kinds in loops.items() if kind in kinds]
     if not known:
         return defaults[kind]
-    fix = f"give {controller} settings of its own"
-    warn_of_other_plant(station, f"the settings of {controller}", station.model.plant, fix)
+    warn_of_other_plant(
+        station,
+        f"the settings of {controller}",
+        station.model.plant,
+        f"give {controller} settings of its own",
+    )
     table = loops[nearest_loop(loop_name(station), known)][kind]
     values = {name: value for name, value in table.items() if name != "provenance"}
     strange = [name for name in values if name not in defaults[kind]._fields]
@@ -298,8 +302,12 @@ def scheduled_gains(controller: str, station: StationInfo, path: Path = GAINS_FI
         )
     tune = "python -m benchmarks tune --model FILE.toml --out gains.toml"
     mine = f'scheduled_gains("{controller}", env.station, Path("gains.toml"))'
-    fix = f"tune its own: {tune}, and give the controller {mine} of controllers.design.designs"
-    warn_of_other_plant(station, f"the gains of {controller}", name, fix)
+    warn_of_other_plant(
+        station,
+        f"the gains of {controller}",
+        name,
+        f"tune its own: {tune}, and give the controller {mine} of controllers.design.designs",
+    )
     table = loops[nearest_loop(loop_name(station), known)][kind][controller]
     columns = column_names(_unit(task.schedule.quantity))
     pressures = np.array(table["pressure_kpa"]) * 1e3

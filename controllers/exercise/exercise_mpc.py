@@ -163,8 +163,7 @@ class ExerciseMPC:
         still = pressure - self._regulator.offset
         program = self._programmed(local.stiffness, pressure)
         past = local.influence * (np.array(self._sent) - still)
-        errors = self._errors(program, past, moment, now)
-        linear = program.pull @ errors
+        linear = program.pull @ self._errors(program, past, moment, now)
         linear[0] -= self.settings.effort * local.influence * (self._chosen - still)
         low, high = (local.influence * (limit - still) for limit in self._limits)
         size = np.ones(len(linear))
@@ -226,5 +225,9 @@ def _horizon(station: StationInfo, length: float) -> Horizon:
 def _joint(station: StationInfo, fade: float) -> Joint:
     exercise = station.task.exercise
     assert exercise is not None
-    lag = station.model.parameters["regulator_lag"].time_constant
-    return Joint(*leg_of(station), lag, fade, exercise.population.typical.stiffness)
+    return Joint(
+        *leg_of(station),
+        station.model.parameters["regulator_lag"].time_constant,
+        fade,
+        exercise.population.typical.stiffness,
+    )

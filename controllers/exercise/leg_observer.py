@@ -81,8 +81,7 @@ class LegObserver:
             process_noise.slack,
         )
         process = np.diag(np.square([0.0, *noise])) * station.period
-        fine = sensors["lvdt"].noise / self._radius
-        spread = np.square([sensors["potentiometer"].noise, fine])
+        spread = np.square([sensors["potentiometer"].noise, sensors["lvdt"].noise / self._radius])
         self._whole, self._push = _leg(station, process_noise.fade)
         self._seen = np.array([[1.0, 0.0, 0.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0, 1.0]])
         self._gain = settled_gain(self._whole, self._seen, process, np.diag(spread))
@@ -256,8 +255,7 @@ def programmed(joint: Joint, of_moment: bool, effort: float, horizon: Horizon) -
     pull = effect.T / horizon.ahead
     changes = np.eye(len(edges) - 1) - np.eye(len(edges) - 1, k=-1)
     square = pull @ effect + effort * changes.T @ changes
-    strides = horizon.stride * np.arange(horizon.ahead)
-    drift = np.add.reduceat(drift, strides, axis=2)
+    drift = np.add.reduceat(drift, horizon.stride * np.arange(horizon.ahead), axis=2)
     return Program(square, pull, state, drift, command[:, :, : horizon.late].copy())
 
 

@@ -150,8 +150,12 @@ class ContractionInverse:
             station: its pressure at the start and its load.
             step: time between nodes (s).
         """
-        motor = (station.task.load - self.drive.offset) / self.drive.gain
-        muscle = Muscle(self.plant, self.plant.settle(motor, pressure=station.pressure))
+        muscle = Muscle(
+            self.plant,
+            self.plant.settle(
+                (station.task.load - self.drive.offset) / self.drive.gain, pressure=station.pressure
+            ),
+        )
         begin = muscle.zero - float(muscle.state[self.plant.states.index("contraction")])
         pressures, pressure = [], station.pressure
         middles, speeds = 0.5 * (target[1:] + target[:-1]), np.diff(target) / step
@@ -171,8 +175,12 @@ class ContractionInverse:
         """Rate (1/s) at which the pressure follows a command above (1) or below it (-1)."""
         rest = self.plant.settle(0.0, pressure=pressure)
         away = sign * PROBE_PA
-        volts = (pressure + away - self.line.offset) / self.line.gain
-        rates = self.plant.derivative(rest.state, 0.0, volts, rest.zero_contraction)
+        rates = self.plant.derivative(
+            rest.state,
+            0.0,
+            (pressure + away - self.line.offset) / self.line.gain,
+            rest.zero_contraction,
+        )
         return float(rates[self.plant.states.index("pressure")]) / away
 
 

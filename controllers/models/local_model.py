@@ -94,8 +94,7 @@ class Stroke:
     def nearest(self, position: float) -> int:
         """Index of the model nearest to a position (m or rad); beyond the ends, theirs."""
         most = len(self.models) - 1
-        share = (position - self.first) / (self.last - self.first)
-        return round(most * min(max(share, 0.0), 1.0))
+        return round(most * min(max((position - self.first) / (self.last - self.first), 0.0), 1.0))
 
 
 def stroke_models(
@@ -180,8 +179,7 @@ def _rests(
     searched = np.linspace(0.0, VOLTAGE_LIMIT, _SEARCHED)
     rising = _rising(rest(searched)[2] - begin, lowest=0.0 if motor else -np.inf)
     volts, rests = searched[rising[0]], rising[1]
-    low = max(reach[0], float(rests[0]))
-    places = np.linspace(low, min(reach[1], float(rests[-1])), PLACES)
+    places = np.linspace(max(reach[0], float(rests[0])), min(reach[1], float(rests[-1])), PLACES)
     volts = np.interp(places, rests, volts)
     states, zeros, positions = rest(volts)
     rests = [

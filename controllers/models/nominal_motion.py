@@ -288,10 +288,8 @@ def nominal_motion(reference: Reference, station: StationInfo) -> NominalMotion:
     step, first = station.period / parts, round(parts * station.action_delay / station.period)
     planned = delayed_start(_sampled(reference, station, parts), first)
     if len(jumps(planned, span)):
-        stroke = stroke_along(planned, station)
-        planned = without_jumps(planned, first, step, stroke, span)
-    volts = _voltages(inverse, _Aim(planned, station))
-    return NominalMotion(reference, station, planned, volts)
+        planned = without_jumps(planned, first, step, stroke_along(planned, station), span)
+    return NominalMotion(reference, station, planned, _voltages(inverse, _Aim(planned, station)))
 
 
 def _sampled(reference: Reference, station: StationInfo, parts: int) -> np.ndarray:
@@ -300,11 +298,9 @@ def _sampled(reference: Reference, station: StationInfo, parts: int) -> np.ndarr
     One that is the task's own at every control instant is taken as that, and asked for all times
     at once, a hundred times as fast as one by one.
     """
-    count = station.task.steps(1.0 / station.period) * parts + 1
-    times = np.arange(count) * station.period / parts
+    times = np.arange(station.task.steps(1.0 / station.period) * parts + 1) * station.period / parts
     own = np.asarray(station.task.schedule.reference(times))
-    instants = [reference(time) for time in times[::parts].tolist()]
-    if np.array_equal(own[::parts], instants):
+    if np.array_equal(own[::parts], [reference(time) for time in times[::parts].tolist()]):
         return own
     return np.array([reference(time) for time in times.tolist()])
 
@@ -336,8 +332,7 @@ def _voltages(inverse: Inverse, aim: _Aim) -> np.ndarray:
     parts = (len(planned) - 1) // len(volts)
     lag, _ = sensor_of(station, station.task.schedule.quantity)
     instants = station.period * np.arange(len(volts) + 1)
-    nodes = station.period / parts * np.arange(len(planned))
-    target = np.interp(instants - lag, nodes, planned)
+    target = np.interp(instants - lag, station.period / parts * np.arange(len(planned)), planned)
     volts = improved(station, volts, target, stroke_along(planned, station))
     volts.flags.writeable = False
     return volts

@@ -73,8 +73,7 @@ def _stroke(
     reach: tuple[float, float],
     directions: tuple[str, ...],
 ) -> Stroke:
-    plant = Plant(nominal.model)
-    return stroke_models(plant, quantity, actuator, rest, reach, directions, period)
+    return stroke_models(Plant(nominal.model), quantity, actuator, rest, reach, directions, period)
 
 
 def rest_voltages(station: StationInfo) -> tuple[float, float]:

@@ -1,11 +1,6 @@
 """Voltages of the actuators: their limit, and those at which a trial rests."""
 
-from typing import TYPE_CHECKING
-
 from pma_gym.envs import StationInfo
-
-if TYPE_CHECKING:
-    pass
 
 VOLTAGE_LIMIT = 10.0
 """Largest voltage of motor and regulator (V)."""

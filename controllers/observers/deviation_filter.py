@@ -109,8 +109,7 @@ class DeviationFilter:
         if self._station.task.actuator == "regulator":
             self._line = self._station.model.parameters["regulator_line"]
         # What is in force before the first command is in what the motion foresees.
-        late = round(self._station.action_delay / self._period)
-        self._sent = deque(self._plan.volts[:late])
+        self._sent = deque(self._plan.volts[: round(self._station.action_delay / self._period)])
         self._systems = [_System.of(model.a[:, 0], model.b) for model in self._stroke.models]
         free = free_rotor(self._station, n)
         self._free = None if free is None else _System.of(*free)
@@ -165,8 +164,9 @@ class DeviationFilter:
         """Voltage (V) that the pressure will call for in a period."""
         if self._line is not None:
             return -self._pressure.excess / self._line.gain
-        ahead = (k + 0.5 - self._taken) * self._period
-        return self._holding_voltage(k, self._pressure.ahead(ahead, self._station.pressure))
+        return self._holding_voltage(
+            k, self._pressure.ahead((k + 0.5 - self._taken) * self._period, self._station.pressure)
+        )
 
     def nominal(self, k: int) -> float:
         """Voltage (V) of the nominal motion that can be in force in a period."""

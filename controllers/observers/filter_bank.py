@@ -270,8 +270,7 @@ class DampingBank:
         bank, _, self._states = design.command.shape
         self.estimates = np.zeros((bank, self._states))
         self.taken = -1
-        prior = np.array(PRIOR if bank == len(FACTORS) else (1.0,))
-        self._prior = np.log(prior)
+        self._prior = np.log(np.array(PRIOR if bank == len(FACTORS) else (1.0,)))
         self._likely = self._prior.copy()
 
     @property

@@ -186,10 +186,12 @@ class PolicyAdapter:
 
     def _environment(self, reading: Measurement, step: int) -> NDArray[np.float32]:
         self._readings.appendleft(reading)
-        action = self._before / MIDDLE_V - 1.0
         return clipped(
             environment_entries(
-                self._table, self._readings, lambda k: self._references[step + k], action
+                self._table,
+                self._readings,
+                lambda k: self._references[step + k],
+                self._before / MIDDLE_V - 1.0,
             )
         )
 

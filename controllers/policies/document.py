@@ -1,6 +1,6 @@
-"""The words of a policy file: which keys its JSON has, and what each of them must be."""
+"""The document of a policy file: which keys its JSON has, and what each of them must be."""
 
-import math
+import re
 import reprlib
 from collections.abc import Mapping
 from typing import Any
@@ -9,45 +9,51 @@ from controllers.design.designs import EXERCISE_KINDS, KINDS
 from controllers.policies.adapter import ActionMapping
 from controllers.policies.network import ACTIVATIONS, OUTPUTS
 from controllers.policies.observation_spec import ObservationSpec
+from pma_gym.document_shape import ListOf, Maybe, Real, ShapeError, Whole, check_shape
 from pma_gym.documents import parse_json
 
 SCHEMA = 1
 
-KEYS = {
-    "": (
-        "schema",
-        "name",
-        "title",
-        "network",
-        "tensors",
-        "sha256",
-        "task",
-        "environment",
-        "view",
-        "observation",
-        "form",
-        "training",
-    ),
-    "network": ("layers", "activation", "output", "scaling"),
-    "environment": ("id", "kwargs"),
-    "training": (
-        "algorithm",
-        "preset",
-        "seed",
-        "steps",
-        "wall_s",
-        "code",
-        "curve",
-        "scores",
-    ),
-}
-"""Keys by section: each must be there, and no other."""
-
-LOOP = ("control_rate_hz", "action_delay_s", "observation_delay_s", "model")
-"""Keys that the environment's kwargs must have; others are the environment's own options."""
-
 LARGEST_LAYER = 65536
 """Most values of a layer."""
+
+SHAPE: dict[str, Any] = {
+    "schema": Whole(),
+    "name": str,
+    "title": str,
+    "network": {
+        "layers": ListOf(Whole(1, LARGEST_LAYER), 2),
+        "activation": str,
+        "output": str,
+        "scaling": Maybe({"epsilon": Real(), "clip": Real()}),
+    },
+    "tensors": dict,
+    "sha256": str,
+    "task": str,
+    "environment": {
+        "id": str,
+        "kwargs": {
+            "control_rate_hz": Real(),
+            "action_delay_s": Real(0.0),
+            "observation_delay_s": Real(0.0),
+            "model": str,
+        },
+    },
+    "view": dict,
+    "observation": ListOf(ListOf(str, 2)),
+    "form": dict,
+    "training": {
+        "algorithm": str,
+        "preset": Maybe(str),
+        "seed": Maybe(Whole()),
+        "steps": Whole(0),
+        "wall_s": Maybe(Real()),
+        "code": Maybe(str),
+        "curve": ListOf(ListOf(Real(), 3)),
+        "scores": dict,
+    },
+}
+"""Schema of the document; the environment's kwargs may have further keys, its own options."""
 
 
 class PolicyError(ValueError):
@@ -58,78 +64,55 @@ def parsed_document(text: bytes) -> dict[str, Any]:
     """The JSON of a policy file, every key checked.
 
     Args:
-        text: the file's content.
+        text: content of the file.
     Raises:
-        PolicyError: no JSON, another schema, a key that is missing, unknown or has a wrong value.
+        PolicyError: what is wrong.
     """
     try:
-        document = parse_json(text, "the file")
+        document: Any = parse_json(text, "the file")
+        check_shape(document, SHAPE)
+    except ShapeError as error:
+        raise PolicyError(str(error)) from None
     except ValueError as error:
         raise PolicyError(f"it is no JSON that can be used ({error})") from None
-    _check(isinstance(document, dict), "it", "a JSON object", document)
-    schema = document.get("schema")
-    if schema != SCHEMA or isinstance(schema, bool):
-        raise PolicyError(f"schema must be {SCHEMA}, the one that is known here, got {schema!r}")
-    for section in KEYS:
-        _check_keys(document, section)
+    rule = f"{SCHEMA}, the one that is known here"
+    _check(document["schema"] == SCHEMA, "schema", rule, document["schema"])
+    network, rate = document["network"], document["environment"]["kwargs"]["control_rate_hz"]
+    scaling = network["scaling"] or {}
+    sections = {"": SHAPE, **{k: SHAPE[k] for k in ("network", "environment", "training")}}
+    for section, shape in sections.items():
+        for key in document[section] if section else document:
+            rule = "among the keys of such a file"
+            _check(key in shape, f"the key {key!r} of {section or 'the file'}", rule, key)
     for key in ("name", "title"):
-        _check(_is_text(document[key]), key, "a text", document[key])
-    kinds = (*KINDS.values(), *EXERCISE_KINDS)
-    _check(document["task"] in kinds, "task", f"one of {', '.join(kinds)}", document["task"])
-    _check_network(document["network"])
+        _check(document[key].strip(), key, "a text", document[key])
+    choices = (
+        ("task", document["task"], (*KINDS.values(), *EXERCISE_KINDS)),
+        ("network.activation", network["activation"], ACTIVATIONS),
+        ("network.output", network["output"], OUTPUTS),
+    )
+    for what, value, known in choices:
+        _check(value in known, what, f"one of {', '.join(known)}", value)
+    last = network["layers"][-1]
+    _check(last == 1, "the last of network.layers", "1: a policy has one action", last)
+    positive = set(scaling) <= {"epsilon", "clip"} and all(x > 0.0 for x in scaling.values())
+    _check(positive, "network.scaling", "null, or a positive epsilon and clip", scaling)
+    _check(rate > 0.0, "environment.kwargs.control_rate_hz", "a positive number of Hz", rate)
     _check_tensors(document)
-    _check_environment(document["environment"])
     _check_view_and_form(document)
-    _check_observation(document)
-    _check_training(document["training"])
+    _check_rows(document["observation"], network["layers"][0], document["training"]["curve"])
     return document
-
-
-def _check_keys(document: Mapping[str, Any], section: str) -> None:
-    table = document[section] if section else document
-    _check(isinstance(table, dict), section, "an object", table)
-    what = section or "it"
-    missing = [key for key in KEYS[section] if key not in table]
-    if missing:
-        raise PolicyError(f"{what} lacks {', '.join(missing)}")
-    strange = [key for key in table if key not in KEYS[section]]
-    if strange:
-        raise PolicyError(
-            f"{what} has {', '.join(map(_short, strange))}, which no policy of schema {SCHEMA} has"
-        )
-
-
-def _check_network(network: Mapping[str, Any]) -> None:
-    layers = network["layers"]
-    sizes = isinstance(layers, list) and all(
-        _is_whole(size) and 1 <= size <= LARGEST_LAYER for size in layers
-    )
-    rule = f"two or more whole numbers in 1-{LARGEST_LAYER}, the last 1: a policy has one action"
-    _check(sizes and len(layers) > 1 and layers[-1] == 1, "network.layers", rule, layers)
-    for key, known in (("activation", ACTIVATIONS), ("output", OUTPUTS)):
-        _check(network[key] in known, f"network.{key}", f"one of {', '.join(known)}", network[key])
-    scaling = network["scaling"]
-    good = scaling is None or (
-        isinstance(scaling, dict)
-        and set(scaling) == {"epsilon", "clip"}
-        and all(_is_real(value) and value > 0.0 for value in scaling.values())
-    )
-    _check(good, "network.scaling", "null, or a positive epsilon and clip", scaling)
 
 
 def _check_tensors(document: Mapping[str, Any]) -> None:
     expected = tensor_shapes(document["network"]["layers"], bool(document["network"]["scaling"]))
     tensors = document["tensors"]
-    _check(isinstance(tensors, dict), "tensors", "an object of shapes by name", tensors)
-    wrong = sorted(
-        name for name in set(expected) | set(tensors) if tensors.get(name) != expected.get(name)
-    )
-    for name in wrong[:1]:
-        actual = _short(tensors[name]) if name in tensors else "none"
-        rule = f"the shape {expected[name]}" if name in expected else "no place"
-        raise PolicyError(f"tensors: {name} has {rule} in network.layers, got {actual}")
+    for name in sorted(set(expected) | set(tensors)):
+        rule = f"of the shape {expected[name]}" if name in expected else "without a place"
+        right = tensors.get(name) == expected.get(name)
+        _check(right, f"tensors: {name}", f"{rule} in network.layers", tensors.get(name))
     digest = document["sha256"]
-    hexadecimal = isinstance(digest, str) and len(digest) == 64 and set(digest) <= _HEXADECIMAL
+    hexadecimal = re.fullmatch("[0-9a-f]{64}", digest)
     _check(hexadecimal, "sha256", "64 hexadecimal digits in small letters", digest)
 
 
@@ -147,91 +130,26 @@ def tensor_shapes(sizes: list[int], scaled: bool) -> dict[str, list[int]]:
     return shapes
 
 
-def _check_environment(environment: dict[str, Any]) -> None:
-    _check(_is_text(environment["id"]), "environment.id", "a text", environment["id"])
-    kwargs = environment["kwargs"]
-    _check(isinstance(kwargs, dict), "environment.kwargs", "an object", kwargs)
-    missing = [key for key in LOOP if key not in kwargs]
-    if missing:
-        raise PolicyError(f"environment.kwargs lacks {', '.join(missing)}")
-    rate = kwargs["control_rate_hz"]
-    rule = "a positive number of Hz"
-    _check(_is_real(rate) and rate > 0.0, "environment.kwargs.control_rate_hz", rule, rate)
-    for key in ("action_delay_s", "observation_delay_s"):
-        delay = kwargs[key]
-        rule = "a number of seconds, 0 or more"
-        _check(_is_real(delay) and delay >= 0.0, f"environment.kwargs.{key}", rule, delay)
-    _check(_is_text(kwargs["model"]), "environment.kwargs.model", "a text", kwargs["model"])
-
-
 def _check_view_and_form(document: Mapping[str, Any]) -> None:
     for key, kind in (("view", ObservationSpec), ("form", ActionMapping)):
-        _check(isinstance(document[key], dict), key, "an object", document[key])
         try:
             kind.of(document[key])
         except (TypeError, ValueError) as error:
             raise PolicyError(f"{key}: {error}") from None
 
 
-def _check_observation(document: Mapping[str, Any]) -> None:
-    rows, count = document["observation"], document["network"]["layers"][0]
-    good = isinstance(rows, list) and all(
-        isinstance(row, list) and len(row) == 2 and all(map(_is_text, row)) for row in rows
+def _check_rows(observation: list[Any], entries: int, curve: list[Any]) -> None:
+    pairs = len(observation) == entries and all(len(row) == 2 for row in observation)
+    _check(
+        pairs,
+        "observation",
+        f"a list of {entries} [entry, what 1.0 stands for], as network.layers begins",
+        observation,
     )
-    _check(good, "observation", "a list of [entry, what 1.0 stands for]", rows)
-    if len(rows) != count:
-        raise PolicyError(
-            f"observation must have a row for each of the {count} entries that network.layers "
-            f"begins with, got {len(rows)}"
-        )
+    points = all(len(point) == 3 for point in curve)
+    _check(points, "training.curve", "a list of [steps, seconds, error]", curve)
 
 
-def _check_training(training: Mapping[str, Any]) -> None:
-    curve = training["curve"]
-    rules = {
-        "algorithm": (_is_text(training["algorithm"]), "a text"),
-        "preset": (_is_nothing_or(_is_text, training["preset"]), "a text or null"),
-        "seed": (_is_nothing_or(_is_whole, training["seed"]), "a whole number or null"),
-        "steps": (_is_whole(training["steps"]) and training["steps"] >= 0, "a count of steps"),
-        "wall_s": (_is_nothing_or(_is_real, training["wall_s"]), "a number of seconds or null"),
-        "code": (_is_nothing_or(_is_text, training["code"]), "a text or null"),
-        "curve": (
-            isinstance(curve, list) and all(map(_is_point, curve)),
-            "a list of [steps, seconds, error]",
-        ),
-        "scores": (isinstance(training["scores"], dict), "an object"),
-    }
-    for key, (good, rule) in rules.items():
-        _check(good, f"training.{key}", rule, training[key])
-
-
-def _check(good: bool, what: str, rule: str, value: object) -> None:
+def _check(good: object, what: str, rule: str, value: object) -> None:
     if not good:
-        raise PolicyError(f"{what} must be {rule}, got {_short(value)}")
-
-
-_HEXADECIMAL = frozenset("0123456789abcdef")
-_short = reprlib.repr
-
-
-def _is_text(value: object) -> bool:
-    return isinstance(value, str) and bool(value.strip())
-
-
-def _is_whole(value: object) -> bool:
-    return isinstance(value, int) and not isinstance(value, bool)
-
-
-def _is_real(value: object) -> bool:
-    # A whole number of many digits is none that a float can hold.
-    if not isinstance(value, int | float) or isinstance(value, bool):
-        return False
-    return abs(value) < 1e300 and math.isfinite(value)
-
-
-def _is_point(value: object) -> bool:
-    return isinstance(value, list) and len(value) == 3 and all(map(_is_real, value))
-
-
-def _is_nothing_or(rule: Any, value: object) -> bool:  # noqa: ANN401 - one of those above
-    return value is None or bool(rule(value))
+        raise PolicyError(f"{what} must be {rule}, got {reprlib.repr(value)}")

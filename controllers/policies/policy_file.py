@@ -68,9 +68,7 @@ def load_policy_file(path: Path | str) -> PolicyFile:
         ImportError: safetensors is not installed; says how to install it.
     """
     document, weights = policy_pair(path)
-    text = _read(document, weights)
-    blob = _read(weights, document)
-    return _parsed(text, blob, document)
+    return _parsed(_read(document, weights), _read(weights, document), document)
 
 
 def save_policy_file(policy: PolicyFile, path: Path | str) -> Path:

@@ -67,15 +67,19 @@ def _effect(effect: Effect, common: str) -> str:
     if effect.signature:
         parts.append(f"Signature in data: {effect.signature}.")
     rows = [_parameter(name, quantity) for name, quantity in effect.quantities.items()]
-    header = [
-        "Parameter in a model file",
-        "Unit",
-        "Bounds",
-        "Neutral",
-        "Usual",
-        "Where the usual value comes from",
-    ]
-    parts.append(table(header, rows))
+    parts.append(
+        table(
+            [
+                "Parameter in a model file",
+                "Unit",
+                "Bounds",
+                "Neutral",
+                "Usual",
+                "Where the usual value comes from",
+            ],
+            rows,
+        )
+    )
     if effect.held:
         names = ", ".join(code(effect.quantities[stem].name(stem)) for stem in effect.held)
         parts.append(f"A diagnosis that fits this effect leaves {names} at the usual value.")

@@ -5,25 +5,19 @@ from typing import Any
 import typer.main
 
 import benchmarks.__main__
-import benchmarks.hidden_effects.__main__
 import pma_gym.cli
 from generators.text import code, table
 
 PROGRAMS = {
-    "pma-gym": pma_gym.cli.app,
-    "benchmarks": benchmarks.__main__.app,
-    "hidden_effects": benchmarks.hidden_effects.__main__.app,
-}
-_CALLED = {
-    "benchmarks": "python -m benchmarks",
-    "hidden_effects": "python -m benchmarks.hidden_effects",
+    "pma-gym": ("pma-gym", pma_gym.cli.app),
+    "benchmarks": ("python -m benchmarks", benchmarks.__main__.app),
 }
 
 
 def commands(program: str) -> str:
     """Every command of a program, with its arguments and options."""
-    group: Any = typer.main.get_command(PROGRAMS[program])
-    called = _CALLED.get(program, program)
+    called, app = PROGRAMS[program]
+    group: Any = typer.main.get_command(app)
     parts = []
     if group.params:
         parts.append(_command(called, group))
@@ -34,9 +28,12 @@ def commands(program: str) -> str:
 def _command(called: str, command: Any) -> str:  # noqa: ANN401 - typer does not export its type
     arguments = [p for p in command.params if p.param_type_name == "argument"]
     options = [p for p in command.params if p.param_type_name == "option" and not p.hidden]
-    usage = [called, *(p.name.upper() for p in arguments)]
-    usage += [f"{p.opts[0]} {p.name.upper()}" for p in options if p.required]
-    usage += ["[OPTIONS]"] if any(not p.required for p in options) else []
+    usage = [
+        called,
+        *(p.name.upper() for p in arguments),
+        *(f"{p.opts[0]} {p.name.upper()}" for p in options if p.required),
+        *(["[OPTIONS]"] if any(not p.required for p in options) else []),
+    ]
     text = " ".join((command.help or "").split())
     example = (command.epilog or "").removeprefix("Example: ")
     parts = [f"### {called}", text, f"```text\n{' '.join(usage)}\n```"]

@@ -53,8 +53,7 @@ def wrong_in_print() -> str:
         for row in _compared()
         if row.verdict == "wrong in print"
     ]
-    header = ["Table", "Figure", "Printed", "Recomputed", "From"]
-    return table(header, rows, right=(2, 3))
+    return table(["Table", "Figure", "Printed", "Recomputed", "From"], rows, right=(2, 3))
 
 
 def rates() -> str:

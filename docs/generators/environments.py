@@ -120,8 +120,11 @@ def suites() -> str:
         suite = frozen_suite(name)
         counts = (len(suite.stations), len(suite.episodes), len(cases(suite, suite.entries)))
         rows.append([code(name), suite.version, suite.title, *counts, _loop(suite)])
-    header = ["Suite", "Version", "What", "Stations", "Episodes", "Cases", "Loop"]
-    return table(header, rows, right=(1, 3, 4, 5))
+    return table(
+        ["Suite", "Version", "What", "Stations", "Episodes", "Cases", "Loop"],
+        rows,
+        right=(1, 3, 4, 5),
+    )
 
 
 def episode_plans(name: str) -> str:

@@ -38,8 +38,7 @@ def _parameters(model: Model, leave_out: Sequence[str] = ()) -> str:
             unit = CATALOGUE[effect].quantities[file_keys[file_key]].unit
             cells = [_value(value), _interval(note), unit, note.source]
             rows.append([code(f"{effect}.{file_key}"), *cells])
-    header = ["Parameter", "Value", "95 % interval", "Unit", "Source"]
-    return table(header, rows, right=(1, 2))
+    return table(["Parameter", "Value", "95 % interval", "Unit", "Source"], rows, right=(1, 2))
 
 
 def differences(base: str, *others: str) -> str:
@@ -102,8 +101,11 @@ def misfit() -> str:
         rows.append(
             [code(model.name), *(f"{np.sqrt(np.nanmean(error**2)):.1f}" for error in errors)]
         )
-    header = ["Model", "Contraction, no load (mm)", "Extension under load (mm)", "Force (N)"]
-    return table(header, rows, right=(1, 2, 3))
+    return table(
+        ["Model", "Contraction, no load (mm)", "Extension under load (mm)", "Force (N)"],
+        rows,
+        right=(1, 2, 3),
+    )
 
 
 def _value(value: Value) -> str:

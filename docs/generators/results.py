@@ -208,5 +208,6 @@ def policies_shipped() -> str:
                 f"{size:.0f}",
             ]
         )
-    header = ["Policy", "Preset", "Seed", "Steps (10^6)", "Validation", "KiB"]
-    return table(header, rows, (2, 3, 4, 5))
+    return table(
+        ["Policy", "Preset", "Seed", "Steps (10^6)", "Validation", "KiB"], rows, (2, 3, 4, 5)
+    )

@@ -17,8 +17,7 @@ def table(
         rows: cells.
         right: columns of numbers, aligned right.
     """
-    rules = ["--:" if column in right else ":--" for column in range(len(header))]
-    lines = [header, rules, *rows]
+    lines = [header, ["--:" if column in right else ":--" for column in range(len(header))], *rows]
     return "\n".join("| " + " | ".join(_cell(cell) for cell in line) + " |" for line in lines)
 
 

@@ -9,8 +9,7 @@ from typing import Annotated
 import numpy as np
 import typer
 
-from pma_gym.cli.comparison import compare
-from pma_gym.cli.convert import convert
+from pma_gym.cli.convert import compare, convert
 from pma_gym.cli.discovery import diagnose, fit
 from pma_gym.cli.options import JsonOption, StrictTyper
 from pma_gym.cli.terminal import (

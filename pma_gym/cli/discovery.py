@@ -199,9 +199,13 @@ def diagnose(
     from pma_gym.discovery.report.page import report_page
 
     with results.opened(resume):
-        arguments = {"seed": seed, "jobs": jobs, "journal": results.journal}
         diagnosis = _run(
-            discovery.diagnose, trials, initial_model, results, arguments, TimeLeft(DIAGNOSIS)
+            discovery.diagnose,
+            trials,
+            initial_model,
+            results,
+            {"seed": seed, "jobs": jobs, "journal": results.journal},
+            TimeLeft(DIAGNOSIS),
         )
         files = {
             "diagnosis.json": diagnosis.text().encode(),
@@ -244,8 +248,14 @@ def fit(
     from pma_gym.discovery.fitting.trial_states import dump_states
 
     with results.opened():
-        arguments = {"seed": seed, "jobs": jobs}
-        refitted = _run(discovery.refit, trials, initial_model, results, arguments, TimeLeft(FIT))
+        refitted = _run(
+            discovery.refit,
+            trials,
+            initial_model,
+            results,
+            {"seed": seed, "jobs": jobs},
+            TimeLeft(FIT),
+        )
         document = refitted.document()
         kept = {key: document[key] for key in _FITTED}
         results.write(

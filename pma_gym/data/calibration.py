@@ -1,13 +1,15 @@
 """Sensor volts to units and back, by table 1 of the dissertation: the only such conversion."""
 
 from dataclasses import dataclass
-from typing import Any, overload
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pma_gym.codegen.generic import floor, where
 from pma_gym.units import SI_FACTORS
+
+Value = TypeVar("Value", float, NDArray[np.float64])
 
 DAQ_LIMIT = 10.0
 """Range of the data acquisition card, either way from 0 (V)."""
@@ -30,19 +32,11 @@ class Calibration:
     gain: float
     offset: float
 
-    @overload
-    def to_volts(self, value: float) -> float: ...
-    @overload
-    def to_volts(self, value: NDArray[np.float64]) -> NDArray[np.float64]: ...
-    def to_volts(self, value: float | NDArray[np.float64]) -> float | NDArray[np.float64]:
+    def to_volts(self, value: Value) -> Value:
         """Voltage (V) of the sensor at a value (SI); a float or an array of any shape."""
         return self.gain * value + self.offset
 
-    @overload
-    def from_volts(self, volts: float) -> float: ...
-    @overload
-    def from_volts(self, volts: NDArray[np.float64]) -> NDArray[np.float64]: ...
-    def from_volts(self, volts: float | NDArray[np.float64]) -> float | NDArray[np.float64]:
+    def from_volts(self, volts: Value) -> Value:
         """Value (SI) that a voltage (V) stands for; a float or an array of any shape."""
         return (volts - self.offset) / self.gain
 

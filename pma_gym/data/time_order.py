@@ -114,14 +114,12 @@ def _fix_backward(time: Array, back: NDArray[np.intp], place: Place) -> str:
     jumps = float(np.sum(excess[0]) - np.sum(excess[1]))
     if even or (ordered.min() > 0 and 0.5 < jumps / float(np.sum(missing)) < 2.0):
         return _SORT
-    copied = [np.isin(time[i : _next(time, i)], time[:i]).all() for i in back]
-    if all(copied):
+    if all([np.isin(time[i : _next(time, i)], time[:i]).all() for i in back]):
         return (
             f"from {where} on, rows have times of rows before them: remove one copy where both "
             "hold the same readings"
         )
-    starts = np.concatenate([[0], back[:-1]])
-    elapsed = time[back - 1] - time[starts]
+    elapsed = time[back - 1] - time[np.concatenate([[0], back[:-1]])]
     if np.all(missing > 0.5 * elapsed):
         return f"the clock begins again, a new trial: {split}"
     return f"the clock was set back: {add}" + (

@@ -161,8 +161,7 @@ def _markdown_table(table: TextTable) -> str:
     names = [_without_tags(name).replace(_GROUP, "<br>") for name in table.header]
     rules = [":--" if column < table.words else "--:" for column in range(columns)]
     rows = [[_without_tags(cell) for cell in row] for row in table.rows if len(row) == columns]
-    cells = [names, rules, *rows]
-    lines = ["| " + " | ".join(map(_cell, row)) + " |" for row in cells]
+    lines = ["| " + " | ".join(map(_cell, row)) + " |" for row in [names, rules, *rows]]
     return "\n".join([f"**{_without_tags(table.title)}**", "", *lines])
 
 

@@ -176,6 +176,11 @@ def compare_conversions() -> list[Comparison]:
         def compute(values: NDArray, factor: float = _PER_UNIT[imperial]) -> NDArray:
             return values / factor
 
-        place = ("conversions", f"section {section}")
-        rows += compare_computed(place, [f"{value} {unit} in {imperial}"], [text], compute, [value])
+        rows += compare_computed(
+            ("conversions", f"section {section}"),
+            [f"{value} {unit} in {imperial}"],
+            [text],
+            compute,
+            [value],
+        )
     return rows

@@ -268,9 +268,13 @@ def compare_profiles() -> list[Comparison]:
     columns = [(name, "intercept") for name in table["parameter"]]
     columns += [(table["parameter"][row], "slope") for row in (0, 1, 4)]
     names = [f"{name} {column}" for name, column in columns]
-    note = "from tables 8, 10, 12, 14 and 16"
     return compare_computed(
-        ("parameter profiles", "2"), names, printed, lambda values: values, sources, note
+        ("parameter profiles", "2"),
+        names,
+        printed,
+        lambda values: values,
+        sources,
+        "from tables 8, 10, 12, 14 and 16",
     )
 
 
@@ -292,9 +296,14 @@ def _compare_constant_stiffness() -> list[Comparison]:
 def _compare_secants(table: Table) -> list[Comparison]:
     """Count I2's spring constants that equal the secant of their row."""
     agree = np.abs(secant_spring(table) - table["spring_n_per_mm"]) <= 3e-5
-    note = "(F_ce - load) / contraction, to 0.00003 N/mm"
     name = "spring constants that are the secant of their row"
-    return compare((CONTRACTION, "I2"), [name], [str(len(table))], [int(agree.sum())], note=note)
+    return compare(
+        (CONTRACTION, "I2"),
+        [name],
+        [str(len(table))],
+        [int(agree.sum())],
+        note="(F_ce - load) / contraction, to 0.00003 N/mm",
+    )
 
 
 def _compare_appendix_d() -> list[Comparison]:
@@ -302,7 +311,12 @@ def _compare_appendix_d() -> list[Comparison]:
     table = load_table("I2")
     spring, damping = table["spring_n_per_mm"], table["damping_relaxation_ns_per_mm"]
     printed = f"{np.median(1.0 / (spring * damping)):.3f}"
-    note = "1/(K B) by Appendix D, B/K by Eq. 9b"
     name = "median time constant of relaxation (s)"
     value = float(np.median(time_constants()[1]))
-    return compare((RELAXATION, "Appendix D"), [name], [printed], [value], note=note)
+    return compare(
+        (RELAXATION, "Appendix D"),
+        [name],
+        [printed],
+        [value],
+        note="1/(K B) by Appendix D, B/K by Eq. 9b",
+    )

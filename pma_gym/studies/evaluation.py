@@ -91,8 +91,7 @@ class Evaluations(list[Evaluation]):
 
     def _repr_html_(self) -> str:
         """Notebook display: the table, and the changes to the samples."""
-        header = ["Phase", *(row.phase.name for row in self)]
-        table = TextTable(self.title, header, self.rows())
+        table = TextTable(self.title, ["Phase", *(row.phase.name for row in self)], self.rows())
         return notebook_html([table, *map(Paragraph, self.notes())])
 
 

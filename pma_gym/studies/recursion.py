@@ -52,8 +52,10 @@ def table_19_recursion(pressure_kpa: int) -> Recursion:
     Source:
         Serres 2008, table 19 and Eq. 25.
     """
-    muscle_rate = 1e3 * _TABLE_19_SPRING_N_PER_MM[pressure_kpa] / DAMPING
-    return tustin_recursion(cascade_transfer(muscle_rate, MOTOR_RATE), TABLE_19_SAMPLE_TIME)
+    return tustin_recursion(
+        cascade_transfer(1e3 * _TABLE_19_SPRING_N_PER_MM[pressure_kpa] / DAMPING, MOTOR_RATE),
+        TABLE_19_SAMPLE_TIME,
+    )
 
 
 def compare_recursion() -> list[Comparison]:
@@ -64,14 +66,18 @@ def compare_recursion() -> list[Comparison]:
 def _compare_formulas() -> list[Comparison]:
     """Eq. 25 is Tustin's method; Appendix C is not, and is unstable."""
     rate = profile_model(300).muscle_rate
-    transfer = cascade_transfer(rate, MOTOR_RATE)
-    right = tustin_recursion(transfer, SAMPLE_TIME)
+    right = tustin_recursion(cascade_transfer(rate, MOTOR_RATE), SAMPLE_TIME)
     rows: list[Comparison] = []
     for table, formula in (("Eq. 25", closed_form_recursion), ("Appendix C", appendix_c_recursion)):
         printed = formula(rate, MOTOR_RATE, SAMPLE_TIME)
-        note = "300 kPa, 0.2 s; its formula against python-control's Tustin"
         texts = [f"{value:.9f}" for value in printed]
-        rows += compare((STUDY, table), Recursion._fields, texts, right, note=note)
+        rows += compare(
+            (STUDY, table),
+            Recursion._fields,
+            texts,
+            right,
+            note="300 kPa, 0.2 s; its formula against python-control's Tustin",
+        )
         radius = float(np.max(np.abs(poles(printed))))
         rows += compare(
             (STUDY, table),
@@ -90,8 +96,13 @@ def _compare_table_19() -> list[Comparison]:
         spring = _TABLE_19_SPRING_N_PER_MM[int(pressure)]
         labels = [f"{pressure} kPa {name}" for name in Recursion._fields]
         texts = [printed[name][row] for name in Recursion._fields]
-        note = f"Eq. 25 with K = {spring:g}, B = 2.90 N s/mm, T = 0.0078 s"
-        rows += compare((STUDY, "19"), labels, texts, table_19_recursion(int(pressure)), note=note)
+        rows += compare(
+            (STUDY, "19"),
+            labels,
+            texts,
+            table_19_recursion(int(pressure)),
+            note=f"Eq. 25 with K = {spring:g}, B = 2.90 N s/mm, T = 0.0078 s",
+        )
         rows += _compare_with_profile(pressure, spring)
     return rows
 
@@ -99,9 +110,14 @@ def _compare_table_19() -> list[Comparison]:
 def _compare_with_profile(pressure: str, spring: float) -> list[Comparison]:
     """Test whether the voltage profile was computed with table 19."""
     used = profile_model(float(pressure)).muscle_rate * DAMPING * 1e-3
-    note = "table 19's against the one that reproduces the voltage profile"
     name = f"{pressure} kPa spring constant (N/mm)"
-    return compare((STUDY, "19"), [name], [f"{spring:.3f}"], [used], note=note)
+    return compare(
+        (STUDY, "19"),
+        [name],
+        [f"{spring:.3f}"],
+        [used],
+        note="table 19's against the one that reproduces the voltage profile",
+    )
 
 
 def agreeing_rows(table: str) -> NDArray[np.bool_]:
@@ -126,8 +142,12 @@ def _compare_profiles() -> list[Comparison]:
     counts = {name: agreeing_rows(name) for name in PROFILES}
     rows: list[Comparison] = []
     for name, agree in counts.items():
-        note = "input and voltage to half a unit of the last printed digit"
-        quantity = ["rows reproduced by the inverse recursion"]
         printed = [str(agree.size)]
-        rows += compare(("voltage profiles", name), quantity, printed, [agree.sum()], note=note)
+        rows += compare(
+            ("voltage profiles", name),
+            ["rows reproduced by the inverse recursion"],
+            printed,
+            [agree.sum()],
+            note="input and voltage to half a unit of the last printed digit",
+        )
     return rows

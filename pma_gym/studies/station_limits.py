@@ -69,8 +69,14 @@ def _compare_table_18() -> list[Comparison]:
         reach = rounding_reach(compute, extension, half_units(data.printed["extension_mm"]))
         labels = [f"{pressure} kPa {name}" for name in names]
         texts = [printed[name][row] for name in names]
-        note = "least squares over 36 rows of table I3"
-        rows += compare((STUDY, "18"), labels, texts, compute(extension), reach, note)
+        rows += compare(
+            (STUDY, "18"),
+            labels,
+            texts,
+            compute(extension),
+            reach,
+            "least squares over 36 rows of table I3",
+        )
     return rows + _compare_used_quadratics()
 
 
@@ -84,9 +90,13 @@ def _compare_used_quadratics() -> list[Comparison]:
             row = printed["pressure_kpa"].index(str(pressure))
             labels = [f"{pressure} kPa {name} as used in table I6" for name in Quadratic._fields]
             texts = [printed[name][row] for name in ("v2_m_per_v2", "v1_m_per_v", "v0_m")]
-            note = "recovered from table I6; table 18 prints the fit of table I3"
-            place = ("voltage profiles", "18")
-            rows += compare(place, labels, texts, list(used[pressure]), note=note)
+            rows += compare(
+                ("voltage profiles", "18"),
+                labels,
+                texts,
+                list(used[pressure]),
+                note="recovered from table I6; table 18 prints the fit of table I3",
+            )
     return rows
 
 
@@ -100,8 +110,13 @@ def _compare_text() -> list[Comparison]:
         cells = _at_load(pressure)
         inputs = np.concatenate([cells["no_load_contraction_mm"], cells["extension_mm"]])
         values.append(_means_at_load(inputs)[2])
-    note = "contraction: mean of 36 rows of table I3; percent: of the three at 900 N"
-    return compare((STUDY, "text"), text["quantity"], text["printed"], values, note=note)
+    return compare(
+        (STUDY, "text"),
+        text["quantity"],
+        text["printed"],
+        values,
+        note="contraction: mean of 36 rows of table I3; percent: of the three at 900 N",
+    )
 
 
 def load_at_rotation(pressure_kpa: float, rotation_deg: float = 90.0) -> float:
@@ -114,8 +129,7 @@ def load_at_rotation(pressure_kpa: float, rotation_deg: float = 90.0) -> float:
         rotation_deg: within the measured rotations.
     """
     data = load_table("I3").where(pressure_nominal_kpa=pressure_kpa)
-    loads = np.unique(data["load_nominal_n"])
-    at_load = [data.where(load_nominal_n=load) for load in loads]
+    at_load = [data.where(load_nominal_n=load) for load in np.unique(data["load_nominal_n"])]
     rotation = [float(np.nanmean(rows["rotation_deg"])) for rows in at_load]
     measured = [float(rows["load_n"].mean()) for rows in at_load]
     return float(np.interp(rotation_deg, rotation, measured))
@@ -128,7 +142,12 @@ def _compare_moments() -> list[Comparison]:
     for pressure, moment in zip(printed["pressure_kpa"], printed["moment_nm"], strict=True):
         load = load_at_rotation(float(pressure))
         radius_mm = 1e3 * float(moment) / load
-        note = f"load at 90 deg x 25.4 mm; the printed moment would need {radius_mm:.1f} mm"
         name = f"{pressure} kPa moment (N m)"
-        rows += compare((STUDY, "23"), [name], [moment], [25.4e-3 * load], note=note)
+        rows += compare(
+            (STUDY, "23"),
+            [name],
+            [moment],
+            [25.4e-3 * load],
+            note=f"load at 90 deg x 25.4 mm; the printed moment would need {radius_mm:.1f} mm",
+        )
     return rows

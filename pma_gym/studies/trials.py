@@ -169,10 +169,15 @@ def _compare_errors(
     def compute(values: NDArray[np.float64]) -> list[float]:
         return [rmse_from_regression(_line(values), *trial.ideal)]
 
-    note = "RMSE^2 = SS_error / n + mean of (intercept + (slope - ideal) t)^2"
     printed = errors.printed[rmse][0]
-    name = f"{pressure} kPa {rmse}"
-    rows = compare_computed(place, [name], [printed], compute, known, note)
+    rows = compare_computed(
+        place,
+        [f"{pressure} kPa {rmse}"],
+        [printed],
+        compute,
+        known,
+        "RMSE^2 = SS_error / n + mean of (intercept + (slope - ideal) t)^2",
+    )
     return rows + compare_computed(
         place,
         [f"{pressure} kPa {percent}"],

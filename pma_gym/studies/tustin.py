@@ -43,10 +43,13 @@ def cascade_transfer(
     # Here: it brings matplotlib along, which takes half a second.
     import control
 
-    numerator = [gain * muscle_rate * motor_rate]
     denominator = np.polymul([1.0, muscle_rate], [1.0, motor_rate])
     return control.TransferFunction(
-        numerator, denominator, inputs="x_input", outputs="y", name="cascade"
+        [gain * muscle_rate * motor_rate],
+        denominator,
+        inputs="x_input",
+        outputs="y",
+        name="cascade",
     )
 
 
@@ -132,5 +135,10 @@ def inverse_recursion(reference: ArrayLike, recursion: Recursion) -> NDArray[np.
     """
     from scipy.signal import lfilter
 
-    denominator = [recursion.e, recursion.d, recursion.c]
-    return np.asarray(lfilter([1.0, recursion.b, recursion.a], denominator, np.asarray(reference)))
+    return np.asarray(
+        lfilter(
+            [1.0, recursion.b, recursion.a],
+            [recursion.e, recursion.d, recursion.c],
+            np.asarray(reference),
+        )
+    )

@@ -98,8 +98,9 @@ def voltage_from_input(x_input: ArrayLike, quadratic: Quadratic) -> NDArray[np.f
     square, linear, constant = quadratic
     # At the peak itself rounding can leave the discriminant a hair below zero.
     root = np.sqrt(np.maximum(linear**2 - 4.0 * square * (constant - inputs), 0.0))
-    voltage = (root - linear) / (2.0 * square)
-    return np.where(inputs == 0.0, 0.0, np.clip(voltage, 0.0, VOLTAGE_LIMIT))
+    return np.where(
+        inputs == 0.0, 0.0, np.clip((root - linear) / (2.0 * square), 0.0, VOLTAGE_LIMIT)
+    )
 
 
 SAMPLE_TIME = 0.2
@@ -256,6 +257,5 @@ def voltage_profile(task: str, pressure_kpa: float) -> VoltageProfile:
     """
     pressures(task)  # says which tasks there are
     times, positions = _REFERENCES[task]
-    samples = round(times[-1] / SAMPLE_TIME) + 1
-    time = SAMPLE_TIME * np.arange(samples)
+    time = SAMPLE_TIME * np.arange(round(times[-1] / SAMPLE_TIME) + 1)
     return feedforward(np.interp(time, times, positions), pressure_kpa)

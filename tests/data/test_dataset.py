@@ -6,8 +6,7 @@ import warnings
 import numpy as np
 import pytest
 
-from pma_gym.data.datasets.dataset import read_dataset
-from pma_gym.data.datasets.lab_sensors import LabSensor
+from pma_gym.data.datasets.dataset import LabSensor, read_dataset
 from pma_gym.data.files.even_clock import joined
 from pma_gym.data.files.trial_files import TrialWarning
 from pma_gym.data.quality.gaps import gaps

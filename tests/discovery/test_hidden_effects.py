@@ -1,6 +1,6 @@
 """Data of the independent generator, frozen: every effect hidden once, nothing, parameters off.
 
-`hidden/` was drawn by `python -m benchmarks.hidden_effects draw` and holds what a lab would have:
+`hidden/` was drawn by `python -m benchmarks hidden-effects --keep` and holds what a lab would have:
 trials, the model that it believes. `truth.json` beside it is read here alone. Seeds: 7 (three
 trials of 5 s, r = 2), 11 (passive_stretch and warm_up: four of 6 s), 12 (nothing, parameters).
 """

@@ -1,15 +1,11 @@
-"""Every case through `pma-gym diagnose`, as a user would call it, and the record of it.
+"""The record of a case that was drawn and diagnosed.
 
 A record has the truth, the essentials of the answer, the time it took, and by which code it was
 measured: the figures say whether the method is still the same.
 """
 
 import json
-import subprocess
-import sys
-import time
 from collections.abc import Iterable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import asdict, dataclass, field
 from datetime import date
 from pathlib import Path
@@ -109,12 +105,9 @@ def write(record: CaseRecord, folder: Path) -> None:
     write_text(path_of(folder, record.number), text)
 
 
-def read(folder: Path, count: int | None = None) -> list[CaseRecord]:
-    """Records of a folder, cases 1 to `count`, all if not given, by number."""
-    if count is None:
-        paths = sorted((folder / "cases").glob("case_*.json"))
-    else:
-        paths = [path_of(folder, number) for number in range(1, count + 1)]
+def read(folder: Path, count: int) -> list[CaseRecord]:
+    """Records of a folder, of cases 1 to `count`, by number."""
+    paths = [path_of(folder, number) for number in range(1, count + 1)]
     records, damaged = list[CaseRecord](), list[str]()
     for path in paths:
         if not path.is_file():
@@ -136,54 +129,13 @@ def say_lost(folder: Path, damaged: Sequence[str]) -> None:
     """Say once which records of a folder are damaged, if any are."""
     if damaged:
         more = f" and {len(damaged) - 1} more" if len(damaged) > 1 else ""
-        then = "those cases are computed anew, the others stay"
-        say_damaged(folder / "cases", f"{damaged[0]}{more}", then)
+        say_damaged(
+            folder / "cases",
+            f"{damaged[0]}{more}",
+            "those cases are computed anew, the others stay",
+        )
 
 
 def path_of(folder: Path, number: int) -> Path:
     """File of a case's record."""
     return folder / "cases" / f"{case_name(number)}.json"
-
-
-COMMAND = (sys.executable, "-m", "pma_gym.cli", "diagnose")
-
-
-def judge(
-    folder: Path,
-    jobs: int,
-    options: Sequence[str] = (),
-    limit: float = 900.0,
-    command: Sequence[str] = COMMAND,
-) -> None:
-    """Diagnose the cases that have no answer; answers go to `folder/answers`.
-
-    Args:
-        folder: what `draw` wrote.
-        jobs: how many at once.
-        options: more options of the command.
-        limit: seconds after which a case is given up.
-        command: the diagnosis.
-    """
-    cases = sorted(path for path in (folder / "cases").iterdir() if path.name.startswith("case_"))
-    answers = folder / "answers"
-    answers.mkdir(exist_ok=True)
-    missing = [case for case in cases if not (answers / case.name / "diagnosis.json").is_file()]
-    print(f"{len(cases) - len(missing)} of {len(cases)} have an answer", file=sys.stderr)
-
-    def ask(case: Path) -> str:
-        out, began = answers / case.name, time.monotonic()
-        call = [*command, str(case), "--out", str(out), *options]
-        try:
-            done = subprocess.run(call, capture_output=True, text=True, timeout=limit)
-        except subprocess.TimeoutExpired:
-            return f"{case.name} gave no answer in {limit:.0f} s"
-        took = time.monotonic() - began
-        out.mkdir(exist_ok=True)
-        (out / "log.txt").write_text(done.stdout + done.stderr, "utf-8")
-        (out / "seconds.txt").write_text(f"{took:.2f}\n", "utf-8")
-        return f"{case.name} {'answered' if done.returncode == 0 else 'FAILED'} in {took:.0f} s"
-
-    with ThreadPoolExecutor(jobs) as pool:
-        futures = [pool.submit(ask, case) for case in missing]
-        for count, future in enumerate(as_completed(futures), 1):
-            print(f"{count}/{len(missing)}  {future.result()}", file=sys.stderr, flush=True)

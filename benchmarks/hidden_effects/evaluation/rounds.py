@@ -20,8 +20,7 @@ import numpy as np
 
 from benchmarks.hidden_effects.evaluation import records
 from benchmarks.hidden_effects.evaluation.verdicts import compare, judged
-from benchmarks.hidden_effects.generation.blocks import Block
-from benchmarks.hidden_effects.generation.cases import Case, measure
+from benchmarks.hidden_effects.generation.cases import Block, Case, measure
 from benchmarks.hidden_effects.generation.files import (
     Volts,
     case_name,
@@ -144,8 +143,7 @@ def _chosen(chooser: str, case: Case, answer: Answer, rounds: int, judge: Judge)
 def with_trial(case: Case, volts: Volts, g: np.random.Generator) -> Case:
     """A case with one trial more, made on its rig."""
     motor, regulator = volts
-    made = len(case.motor)
-    (readings,) = measure(case.truth, motor[None], regulator[None], made, g)
+    (readings,) = measure(case.truth, motor[None], regulator[None], len(case.motor), g)
     return replace(
         case,
         time=[*case.time, np.arange(len(motor)) / RATE],

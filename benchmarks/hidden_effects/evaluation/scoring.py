@@ -3,12 +3,10 @@
 Plots of what was named, against the size of the effect.
 """
 
-import json
 import math
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import pairwise
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -22,10 +20,8 @@ from benchmarks.hidden_effects.evaluation.targets import (
     RATES,
     SIZE_ERROR,
     Target,
-    table,
 )
-from benchmarks.hidden_effects.evaluation.verdicts import Outcome, compare, judged, unanswered
-from pma_gym.documents import read_json
+from benchmarks.hidden_effects.evaluation.verdicts import Outcome, compare, judged, no_answer
 from pma_gym.pages.figures import legend_below, picture, png
 
 Z = 1.959964
@@ -39,39 +35,10 @@ LEAST_ROUNDS = 2
 """Rounds that a mean counts to, at least: one that ended before did not settle later."""
 
 
-def score(folder: Path) -> str:
-    """Tables of what `draw` and `judge` left in a folder; as JSON in `folder/score.json`."""
-    document = count(read(folder))
-    (folder / "score.json").write_text(json.dumps(document, indent=1) + "\n", "utf-8")
-    return table(document)
-
-
-def read(folder: Path) -> list[Outcome]:
-    """Outcomes of all cases that `draw` wrote to a folder."""
-    outcomes = []
-    for case in sorted((folder / "cases").glob("case_*")):
-        answer = folder / "answers" / case.name
-        truth = read_json(
-            folder / "truth" / f"{case.name}.json", "journal_mib", own=True, finite=False
-        )
-        if not (answer / "diagnosis.json").is_file():
-            outcomes.append(unanswered(truth, f"no {answer / 'diagnosis.json'}"))
-            continue
-        outcome = compare(
-            truth, read_json(answer / "diagnosis.json", "journal_mib", own=True, finite=False)
-        )
-        if (answer / "seconds.txt").is_file():
-            outcome.seconds = float((answer / "seconds.txt").read_text("utf-8"))
-        outcomes.append(outcome)
-    return outcomes
-
-
 def outcome_of(record: CaseRecord) -> Outcome:
     """The outcome of a case that the job kept."""
-    if record.answer is None:
-        outcome = unanswered(record.truth, record.message)
-    else:
-        outcome = compare(record.truth, record.answer)
+    answer = no_answer(record.message) if record.answer is None else record.answer
+    outcome = compare(record.truth, answer)
     outcome.number = record.number
     outcome.rounds = {
         chooser: [{**each, **judged(each["said"], outcome.truth)} for each in rounds]
@@ -350,8 +317,10 @@ def naming_picture(ranges: Sequence[Mapping[str, Any]]) -> bytes:
         panel.set_xscale("log")
         panel.set_xticks([0.1, 0.2, 0.3, 0.5, 1.0, 2.0], ["0.1", "0.2", "0.3", "0.5", "1", "2"])
         panel.minorticks_off()
-        panel.set_ylim(0.0, 103.0)
-        panel.set_xlabel("size r of the effect over the noise, after a refit without it")
-        panel.set_ylabel("cases (%)")
+        panel.set(
+            ylim=(0.0, 103.0),
+            xlabel="size r of the effect over the noise, after a refit without it",
+            ylabel="cases (%)",
+        )
         legend_below(drawn, panel.get_legend_handles_labels()[0], 3)
         return png(drawn)

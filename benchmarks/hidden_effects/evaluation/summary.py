@@ -1,14 +1,12 @@
 """`python -m benchmarks hidden-effects-report`: several blocks' figures as one document."""
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from benchmarks.hidden_effects.evaluation.records import Measured, measured_text
 from benchmarks.hidden_effects.evaluation.targets import instead, listed, percent
-from benchmarks.hidden_effects.run_blocks import SCORE, JobError, merged
-from pma_gym.document_shape import ListOf, ShapeError, check_shape
 from pma_gym.documents import read_json
 from pma_gym.pages.document import Block, Heading, Paragraph, TextTable, to_html, to_markdown
 
@@ -44,46 +42,6 @@ def _rate(rate: Mapping[str, Any]) -> str:
 
 MISSES = 40
 """How many misses of a block are listed; the rest are in its JSON."""
-
-
-_MEASURED = ListOf({"commit": str, "date": str, "method": str}, 1)
-_SCORE = {"seed": object, "blocks": {"*": {"measured": _MEASURED}}, "failures": ListOf(str)}
-"""Shape of the figures that the job writes."""
-
-
-def read_scores(places: Sequence[Path]) -> dict[str, Any]:
-    """Figures of folders that the job filled, or of its JSON files, as one document.
-
-    Raises:
-        JobError: nothing to read, no figures in it, or two sets of one block.
-    """
-    documents = []
-    for place in places:
-        path = place / SCORE if place.is_dir() else place
-        if not path.is_file():
-            raise JobError(
-                f"{path}: there is no such file; name a folder in which `python -m benchmarks "
-                "hidden-effects` ended, or its --json file"
-            )
-        try:
-            document = read_json(path, "journal_mib", own=True)
-        except ValueError as error:
-            raise JobError(
-                f"{path} is no JSON file ({error}); name one that the job wrote"
-            ) from None
-        try:
-            check_shape(document, _SCORE)
-        except ShapeError as error:
-            raise JobError(
-                f"{path} holds no figures of `python -m benchmarks hidden-effects` ({error}); run "
-                "it again, or name another"
-            ) from None
-        documents.append(document)
-    names = [name for document in documents for name in document["blocks"]]
-    for name in names:
-        if names.count(name) > 1:
-            raise JobError(f"block {name} is in {names.count(name)} of the files; name it once")
-    return merged(documents)
 
 
 def report(document: dict[str, Any], suffix: str = ".md") -> str:
@@ -150,22 +108,18 @@ def _own(figures: dict[str, Any]) -> list[Block]:
     if seconds["median"] is not None:
         text += f" A diagnosis took {seconds['median']:.1f} s (median), {seconds['most']:.1f} s"
         text += " at most."
-    blocks: list[Block] = [Paragraph(text), _confusion(figures["confusion"])]
-    if figures["by_effect"]:
-        blocks.append(_by_effect(figures["by_effect"]))
-    if len(figures["by_size"]) > 1:
-        blocks.append(_by_size(figures["by_size"]))
-    if figures["sizes"]["by_parameter"]:
-        blocks.append(_sizes(figures["sizes"]["by_parameter"]))
-    if figures["by_kind"]:
-        blocks.append(_by_kind(figures["by_kind"]))
-    if figures["by_parameter_off"]:
-        blocks.append(_by_parameter_off(figures["by_parameter_off"]))
-    if "proposed" in figures["rounds"]:
-        blocks.append(_rounds(figures["rounds"]))
-    if figures["misses"]:
-        blocks.append(_misses(figures["misses"]))
-    return blocks
+    rounds = figures["rounds"] if "proposed" in figures["rounds"] else {}
+    tables: list[tuple[Any, Any]] = [
+        (figures["by_effect"], _by_effect),
+        (figures["by_size"] if len(figures["by_size"]) > 1 else [], _by_size),
+        (figures["sizes"]["by_parameter"], _sizes),
+        (figures["by_kind"], _by_kind),
+        (figures["by_parameter_off"], _by_parameter_off),
+        (rounds, _rounds),
+        (figures["misses"], _misses),
+    ]
+    shown = [table(some) for some, table in tables if some]
+    return [Paragraph(text), _confusion(figures["confusion"]), *shown]
 
 
 def _confusion(confusion: dict[str, dict[str, int]]) -> TextTable:
@@ -173,8 +127,11 @@ def _confusion(confusion: dict[str, dict[str, int]]) -> TextTable:
         [hidden, str(sum(said.values())), str(said.get(hidden, 0)), listed(_without(said, hidden))]
         for hidden, said in confusion.items()
     ]
-    header = ["hidden", "cases", "named so", "said otherwise"]
-    return TextTable("What was hidden, and what was said", header, rows)
+    return TextTable(
+        "What was hidden, and what was said",
+        ["hidden", "cases", "named so", "said otherwise"],
+        rows,
+    )
 
 
 def _without(said: dict[str, int], name: str) -> dict[str, int]:
@@ -213,8 +170,9 @@ def _by_kind(kinds: dict[str, Any]) -> TextTable:
 
 def _by_parameter_off(parameters: dict[str, Any]) -> TextTable:
     rows = [[name, percent(each["named"]), instead(each)] for name, each in parameters.items()]
-    header = ["off by a tenth", "named", "named where it was not, and was right"]
-    return TextTable("By parameter", header, rows)
+    return TextTable(
+        "By parameter", ["off by a tenth", "named", "named where it was not, and was right"], rows
+    )
 
 
 def _rounds(rounds: dict[str, Any]) -> TextTable:

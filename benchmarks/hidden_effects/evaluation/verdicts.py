@@ -19,7 +19,10 @@ RIGHT_STRUCTURE = ("agrees", "parameters")
 MOST_LEFT = 3.0
 """Noises that such a verdict may leave."""
 
-VERDICTS = (*get_args(Verdict), "no answer")
+NO_ANSWER = "no answer"
+"""Verdict where the diagnosis raised an error."""
+
+VERDICTS = (*get_args(Verdict), NO_ANSWER)
 """What is said where nothing is named."""
 
 PATHS: dict[str, tuple[str, ...]] = {
@@ -175,8 +178,18 @@ def compare(truth: Mapping[str, Any], answer: Mapping[str, Any]) -> Outcome:
     near = any(effect["name"] in meant for effect in effects[:1])
     beside = any(meant & {effect["name"], *effect["confused_with"][:2]} for effect in effects[:1])
     right = bool(hidden) and sorted(named) == sorted(hidden)
-    outcome = _of(
-        truth,
+    block, ratios = truth["block"], [e["r"] for e in truth["effects"] if "r" in e]
+    least = NEAR_RATIO * LEAST_RATIO.get(block, 0.5)
+    odds = list((truth.get("log_odds") or {}).values())
+    outcome = Outcome(
+        block=block,
+        truth=hidden,
+        number=truth.get("number", 0),
+        ratio=min(ratios, default=None),
+        parameters_tellable=min(odds) > UNTOLD if odds else None,
+        off=tuple(_off(truth)) if block == "parameters" else (),
+        kind=truth.get("kind", ""),
+        strong=all(ratio >= least for ratio in ratios),
         verdict=verdict,
         named=named,
         right=right,
@@ -186,6 +199,7 @@ def compare(truth: Mapping[str, Any], answer: Mapping[str, Any]) -> Outcome:
         detected=verdict in STRUCTURAL,
         hits=len(set(named) & set(hidden)),
         spurious=len(named) > len(hidden),
+        answered=verdict != NO_ANSWER,
         sentence=answer.get("sentence", ""),
         left=_left(truth, answer),
     )
@@ -197,43 +211,9 @@ def compare(truth: Mapping[str, Any], answer: Mapping[str, Any]) -> Outcome:
     return outcome
 
 
-def unanswered(truth: Mapping[str, Any], message: str) -> Outcome:
-    """The outcome of a case whose diagnosis raised an error: no hit, and no claim."""
-    off = truth["block"] == "parameters" and bool(_off(truth))
-    return _of(
-        truth,
-        verdict="no answer",
-        named=(),
-        right=False,
-        near=False,
-        beside=False,
-        wrong=False,
-        detected=False,
-        hits=0,
-        spurious=False,
-        parameters=False if off else None,
-        parameters_reported=False if off else None,
-        answered=False,
-        sentence=message,
-    )
-
-
-def _of(truth: Mapping[str, Any], **said: Any) -> Outcome:  # noqa: ANN401
-    """An outcome with what the truth alone tells."""
-    block, ratios = truth["block"], [e["r"] for e in truth["effects"] if "r" in e]
-    least = NEAR_RATIO * LEAST_RATIO.get(block, 0.5)
-    odds = list((truth.get("log_odds") or {}).values())
-    return Outcome(
-        block=block,
-        truth=tuple(effect["name"] for effect in truth["effects"]),
-        number=truth.get("number", 0),
-        ratio=min(ratios, default=None),
-        parameters_tellable=min(odds) > UNTOLD if odds else None,
-        off=tuple(_off(truth)) if block == "parameters" else (),
-        kind=truth.get("kind", ""),
-        strong=all(ratio >= least for ratio in ratios),
-        **said,
-    )
+def no_answer(message: str) -> dict[str, Any]:
+    """What stands for the answer of a diagnosis that raised an error: no hit, and no claim."""
+    return {"verdict": NO_ANSWER, "effects": [], "parameters": {}, "gap": {}, "sentence": message}
 
 
 def of_group(named: Sequence[str], hidden: Sequence[str]) -> bool:
@@ -272,7 +252,7 @@ def _parameters(outcome: Outcome, truth: Mapping[str, Any], answer: Mapping[str,
     outcome.moved = tuple(moved)
     outcome.parameters = not outcome.missing
     outcome.parameters_reported = all(_all_start_with(named, PATHS[name]) for name in off)
-    outcome.parameters_spurious = bool(outcome.beyond)
+    outcome.parameters_spurious = bool(outcome.beyond) if outcome.answered else None
 
 
 def _left(truth: Mapping[str, Any], answer: Mapping[str, Any]) -> float | None:

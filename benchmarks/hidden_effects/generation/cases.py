@@ -1,4 +1,7 @@
-"""Drawing a case: excitations, a rig that differs from what the lab believes, an effect, noise."""
+"""Drawing a case: excitations, a rig that differs from what the lab believes, an effect, noise.
+
+The blocks of the target table: what their cases hide, and how large.
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -18,12 +21,10 @@ from benchmarks.hidden_effects.generation.effect_size import (
 )
 from benchmarks.hidden_effects.generation.effects import ALL, KINDS, OUTSIDE, Values
 from benchmarks.hidden_effects.generation.excitation import EXCITATIONS, draw_trial
-from benchmarks.hidden_effects.generation.readout_noise import NONE, ReadoutNoise, draw_noise
+from benchmarks.hidden_effects.generation.readout_noise import NONE, UGLY, ReadoutNoise, draw_noise
 from benchmarks.hidden_effects.physics import rig as rigs
 from benchmarks.hidden_effects.physics.rig import NOMINAL, SENSORS, UNITS, Array
 from benchmarks.hidden_effects.physics.simulation import RATE, Commands
-
-BLOCKS = ("single", "nothing", "parameters", "unknown", "pair")
 
 SCALED_TOGETHER = (
     ("force_slope",),
@@ -294,8 +295,7 @@ def _measured(
     for i in range(4):
         memory = float(colours[i])
         start = [memory * float(g.standard_normal())]
-        keep = np.sqrt(1.0 - memory**2)
-        coloured, _ = lfilter([keep], [1.0, -memory], white[:, i], zi=start)
+        coloured, _ = lfilter([np.sqrt(1.0 - memory**2)], [1.0, -memory], white[:, i], zi=start)
         out[:, i] = clean[:, i] / UNITS[i] + rigs.NOISE[i] * levels[i] * (coloured + added[:, i])
     out[:, 0] += zero
     coarse = parameters.get("sensor_quantisation", {"signal": -1.0, "daq_steps": 1.0})
@@ -306,3 +306,50 @@ def _measured(
     # Rotation counts from where the trial begins.
     out[:, 1] -= out[0, 1]
     return out
+
+
+@dataclass(frozen=True)
+class Block:
+    """Cases of one kind.
+
+    Attributes:
+        name: of the block.
+        turns: effects that cases take turns in, so that each is hidden equally often; where empty,
+            `draw_case` decides what is hidden.
+        ratio: range of r, what an effect changes beyond a refit over the noise.
+        trials: of a case.
+        seconds: of a trial (s).
+        rounds: experiments that follow on the same rig, where the diagnosis asks for one.
+        ugly: what stands in the readings beside noise (`readout_noise`); empty: nothing.
+    """
+
+    name: str
+    turns: tuple[str, ...] = ()
+    ratio: tuple[float, float] = (0.5, 2.0)
+    trials: int = 6
+    seconds: float = 8.0
+    rounds: int = 0
+    ugly: str = ""
+
+    def draw(self, seed: int, number: int) -> Case:
+        """Case of a number, 1 and up; the same seed and number give the same bits."""
+        hidden = (self.turns[(number - 1) % len(self.turns)],) if self.turns else None
+        drawn = (self.trials, self.seconds, self.ratio, self.ugly)
+        return draw_case(seed, number, self.name, hidden, *drawn)
+
+
+BLOCKS: dict[str, Block] = {
+    block.name: block
+    for block in (
+        Block("single", tuple(KINDS)),
+        Block("faint", tuple(KINDS), (0.3, 0.3)),
+        Block("nothing"),
+        Block("parameters"),
+        Block("pair"),
+        Block("unknown", tuple(OUTSIDE)),
+        *(Block(f"single_{ugly}", tuple(KINDS), ugly=ugly) for ugly in UGLY),
+        *(Block(f"nothing_{ugly}", ugly=ugly) for ugly in UGLY),
+        Block("slow_drift", ("creep", "leakage", "warm_up"), ugly="drift"),
+    )
+}
+"""By name, in the order of the table."""

@@ -228,8 +228,7 @@ class Behind:
 
 def _steps_known(name: str, value: float) -> float:
     """One over what is known of a parameter beforehand, in steps of `neighbours`."""
-    step = ABSOLUTE.get(name, SHARE * abs(value))
-    return step / KNOWN_ABSOLUTE.get(name, KNOWN * abs(value))
+    return ABSOLUTE.get(name, SHARE * abs(value)) / KNOWN_ABSOLUTE.get(name, KNOWN * abs(value))
 
 
 def odds_of_parameters(

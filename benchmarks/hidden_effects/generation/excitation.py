@@ -56,10 +56,12 @@ def draw_trial(
 
 def volts(pressure: Array, load: Array) -> tuple[Array, Array]:
     """Motor and regulator voltages for pressures (Pa) and loads (N), by the lab's numbers."""
-    motor = (load - NOMINAL["drive_offset"]) / NOMINAL["drive_gain"]
-    regulator = (pressure - NOMINAL["regulator_offset"]) / NOMINAL["regulator_gain"]
     # What is logged, in whole millivolts, is what was sent.
-    return np.clip(np.round(motor, 3), 0.0, 10.0), np.clip(np.round(regulator, 3), 0.0, 10.0)
+    return np.clip(
+        np.round((load - NOMINAL["drive_offset"]) / NOMINAL["drive_gain"], 3), 0.0, 10.0
+    ), np.clip(
+        np.round((pressure - NOMINAL["regulator_offset"]) / NOMINAL["regulator_gain"], 3), 0.0, 10.0
+    )
 
 
 def _pressure(g: Generator, deep: bool = False) -> float:
@@ -136,8 +138,7 @@ def _reversals(g: Generator, time: Array, deepest: float) -> tuple[Array, Array]
     low, high = loads_at(pressure, deepest)
     middle, half = 0.5 * (low + high), 0.5 * (high - low)
     shares = np.linspace(1.0, 0.15, g.integers(5, 10)) * g.uniform(0.8, 1.0)
-    signs = np.resize([-1.0, 1.0], len(shares))
-    levels = np.r_[middle, middle + half * shares * signs]
+    levels = np.r_[middle, middle + half * shares * np.resize([-1.0, 1.0], len(shares))]
     return np.full(time.shape, pressure), _zigzag(time, levels, g.uniform(150, 800))
 
 
@@ -225,8 +226,7 @@ def _one_pressure(g: Generator, time: Array) -> Asked:
     turns = [LOW_START_S + k * (SECONDS - 2.0 * LOW_START_S) / 4.0 for k in range(5)]
     fast = np.interp(time, turns, np.resize([low, high], 5))
     slow = low + (high - low) * (1.0 - np.abs(2.0 * _ramp(time) - 1.0))
-    step = np.where(time > 0.5 * SECONDS, high, low)
-    return [(still, fast), (still, slow), (still, step)]
+    return [(still, fast), (still, slow), (still, np.where(time > 0.5 * SECONDS, high, low))]
 
 
 LOW_EXCITATION: dict[str, Callable[[Generator, Array], Asked]] = {

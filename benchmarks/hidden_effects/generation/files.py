@@ -36,12 +36,6 @@ def case_name(number: int) -> str:
     return f"case_{number:04d}"
 
 
-def is_written(folder: Path, number: int) -> bool:
-    """Whether a case is there, whole."""
-    name = case_name(number)
-    return (folder / "cases" / name).is_dir() and (folder / "truth" / f"{name}.json").is_file()
-
-
 def write_case(case: Case, folder: Path, number: int) -> None:
     """Write a case; its folder appears whole or not at all, after its truth."""
     name = case_name(number)

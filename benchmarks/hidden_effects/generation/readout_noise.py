@@ -44,8 +44,7 @@ class ReadoutNoise:
         out = np.zeros((len(time), 4))
         for signal, size in enumerate(self.size):
             if self.kind == "hum":
-                phase = g.uniform(0.0, 2.0 * np.pi)
-                angle = 2.0 * np.pi * self.hertz * time + phase
+                angle = 2.0 * np.pi * self.hertz * time + g.uniform(0.0, 2.0 * np.pi)
                 out[:, signal] = np.sqrt(2.0) * size * np.sin(angle)
             elif self.kind == "drift":
                 out[:, signal] = size * _walk(g, len(time))

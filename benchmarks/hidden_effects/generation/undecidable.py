@@ -13,9 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.hidden_effects.generation.blocks import BLOCKS as USUAL
-from benchmarks.hidden_effects.generation.blocks import Block
-from benchmarks.hidden_effects.generation.cases import Case, draw_rig, measure
+from benchmarks.hidden_effects.generation.cases import BLOCKS as USUAL
+from benchmarks.hidden_effects.generation.cases import Block, Case, draw_rig, measure
 from benchmarks.hidden_effects.generation.effect_size import (
     SEEN,
     UNTOLD,
@@ -132,8 +131,7 @@ class Rig:
     def experiment(self, motor: Array, regulator: Array) -> Experiment:
         """Commands on it, shape (trials, rows)."""
         commands = Commands(motor, regulator, np.arange(len(motor), dtype=float))
-        measured = np.ones(motor.shape, bool)
-        return Experiment(commands, measured, rigs.noise_levels(self.levels))
+        return Experiment(commands, np.ones(motor.shape, bool), rigs.noise_levels(self.levels))
 
 
 def draw_undecidable(seed: int, number: int, effect: str) -> Case:
@@ -175,8 +173,11 @@ def shown_by_library(g: np.random.Generator, rig: Rig, effect: str) -> dict[str,
     typical, kind = ALL[effect].draw(g, 900.0), ALL[effect]
     sizes = [float(size) for size in SIZES if size <= kind.most]
     near = neighbours(rig.numbers)
-    variants = [(rig.numbers, {}), *((each, {}) for each in near)]
-    variants += [(rig.numbers, {effect: kind.at(typical, size)}) for size in sizes]
+    variants = [
+        (rig.numbers, {}),
+        *((each, {}) for each in near),
+        *((rig.numbers, {effect: kind.at(typical, size)}) for size in sizes),
+    ]
     readings = simulate_variants(experiment.commands, variants)
     ruler = Ruler(experiment, readings[0], readings[1 : 1 + len(near)])
     ratios = [ruler.size(each) for each in readings[1 + len(near) :]]
@@ -212,8 +213,11 @@ def decided_case(
         behind; `ratios` by signal; `untold`.
     """
     near = neighbours(numbers)
-    variants = [(numbers, {}), *((each, {}) for each in near)]
-    variants += [(numbers, {effect: hidden["parameters"]})]
+    variants = [
+        (numbers, {}),
+        *((each, {}) for each in near),
+        (numbers, {effect: hidden["parameters"]}),
+    ]
     base, *changed, truth = simulate_variants(experiment.commands, variants)
     behind = Behind(experiment, numbers, base, changed)
     nothing = behind.log_odds(truth)
@@ -240,8 +244,7 @@ def _rivals(
         if name not in group(effect)
     }
     variants = [(numbers, {name: values}) for name, values in rivals.items()]
-    readings = simulate_variants(experiment.commands, variants)
-    return dict(zip(rivals, readings, strict=True))
+    return dict(zip(rivals, simulate_variants(experiment.commands, variants), strict=True))
 
 
 BLOCKS: dict[str, Block] = USUAL | {

@@ -37,8 +37,7 @@ class NarrowValve(Hidden):
         """The rate, held."""
         ratio = (moment.pressure + ATMOSPHERE) / (SUPPLY + ATMOSPHERE)
         beyond = np.clip((ratio - CRITICAL) / (1.0 - CRITICAL), 0.0, 1.0)
-        filling = self.limit * np.sqrt(1.0 - beyond * beyond)
-        return np.clip(rate, -self.limit, filling)
+        return np.clip(rate, -self.limit, self.limit * np.sqrt(1.0 - beyond * beyond))
 
 
 class LateValve(Hidden):
@@ -62,8 +61,7 @@ class LazyValve(Hidden):
 
     def flow(self, rate: Array, moment: Moment) -> Array:
         """The rate of what is wrong beyond the width."""
-        error = moment.asked - moment.pressure
-        size = np.abs(error)
+        size = np.abs(moment.asked - moment.pressure)
         return rate * np.maximum(size - self.width, 0.0) / np.maximum(size, 1e-6)
 
 
@@ -78,8 +76,7 @@ class Squeeze(Hidden):
     def chamber(self, moment: Moment) -> Array:
         """Rate of the pressure from the rate of ln V, V as length times width squared."""
         length = self.length - moment.contraction
-        width2 = np.maximum(self.thread2 - length * length, 1e-6)
-        growth = 2.0 * length / width2 - 1.0 / length
+        growth = 2.0 * length / np.maximum(self.thread2 - length * length, 1e-6) - 1.0 / length
         return -self.exponent * (moment.pressure + ATMOSPHERE) * growth * moment.velocity
 
 
@@ -147,8 +144,12 @@ class CurrentLag(Hidden):
             keep = float(np.exp(-step / self.time[i]))
             share = (1.0 - keep) * self.time[i] / step
             now, past = 1.0 - share, share - keep
-            memory = [keep * self.last_output[i] + past * self.last_input[i]]
-            out[:, i], _ = lfilter([now, past], [1.0, -keep], loads[:, i], zi=memory)
+            out[:, i], _ = lfilter(
+                [now, past],
+                [1.0, -keep],
+                loads[:, i],
+                zi=[keep * self.last_output[i] + past * self.last_input[i]],
+            )
         self.last_output, self.last_input = out[-1].copy(), loads[-1].copy()
         return out
 
@@ -205,8 +206,9 @@ class BearingFriction(Hidden):
         """Friction against the pulley's motion."""
         if not self.bristles.ready:
             return 0.0 * self.sliding
-        speed = moment.rig["radius"] * moment.spin
-        return -self.sliding * self.bristles.deflect(speed, moment.step)
+        return -self.sliding * self.bristles.deflect(
+            moment.rig["radius"] * moment.spin, moment.step
+        )
 
 
 class Slack(Hidden):

@@ -69,8 +69,9 @@ class MaxwellSlip(Hidden):
 
     def force(self, moment: Moment) -> Array:
         """What the elements hold the slide back with."""
-        moved = self.stretched + moment.step * moment.velocity
-        self.stretched = np.clip(moved, -self.distances, self.distances)
+        self.stretched = np.clip(
+            self.stretched + moment.step * moment.velocity, -self.distances, self.distances
+        )
         return -self.scale * (self.springs @ self.stretched)
 
 
@@ -115,8 +116,7 @@ class Overstretch(Hidden):
 
     def force(self, moment: Moment) -> Array:
         """Force at a contraction."""
-        percent = -moment.contraction * (100.0 / LENGTH)
-        return self.factor * np.interp(percent, self.AT, self.FORCE)
+        return self.factor * np.interp(-moment.contraction * (100.0 / LENGTH), self.AT, self.FORCE)
 
 
 class LoadedDamping(Hidden):

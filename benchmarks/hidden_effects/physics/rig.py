@@ -62,15 +62,20 @@ DAQ_STEP = 20.0 / 4096
 
 def stiffness(pressure: Array, rig: Numbers) -> Array:
     """Stiffness of the muscle (N/m) at gauge pressures (Pa)."""
-    low = rig["stiffness_low"] + rig["stiffness_low_slope"] * pressure
-    high = rig["stiffness_high"] + rig["stiffness_high_slope"] * pressure
-    return np.where(pressure <= SOFT_ABOVE, low, high)
+    return np.where(
+        pressure <= SOFT_ABOVE,
+        rig["stiffness_low"] + rig["stiffness_low_slope"] * pressure,
+        rig["stiffness_high"] + rig["stiffness_high_slope"] * pressure,
+    )
 
 
 def resistance(pressure: Array, velocity: Array, rig: Numbers) -> Array:
     """Damping coefficient (N s/m): one while contracting, another while relaxing."""
-    fast = rig["damping_high"] + rig["damping_high_slope"] * pressure
-    relaxing = np.where(pressure <= FAST_ABOVE, rig["damping_relaxing"], fast)
+    relaxing = np.where(
+        pressure <= FAST_ABOVE,
+        rig["damping_relaxing"],
+        rig["damping_high"] + rig["damping_high_slope"] * pressure,
+    )
     return np.where(velocity > 0.0, rig["damping_contracting"], relaxing)
 
 

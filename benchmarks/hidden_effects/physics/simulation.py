@@ -68,8 +68,7 @@ def simulate(commands: Commands, rig: Numbers, hidden: Sequence[Hidden] = ()) ->
         middles = (np.arange(count, dtype=np.float64) + first * SUBSTEPS + 0.5) * step
         loads = _loads(commands, rig, hidden, middles, step)
         asked = _pressures(commands, rig, hidden, middles, step)
-        signals = _integrate(moment, hidden, loads, asked)
-        filtered = sensors.follow(signals, step)
+        filtered = sensors.follow(_integrate(moment, hidden, loads, asked), step)
         for i, signal in enumerate(filtered):
             kept = signal[SUBSTEPS - 1 :: SUBSTEPS].T
             readings[:, first + 1 : first + 1 + kept.shape[1], i] = kept
@@ -82,8 +81,9 @@ def equilibrium(commands: Commands, rig: Numbers, hidden: Sequence[Hidden], step
     load = _loads(commands, rig, hidden, start, step, once=True)[0]
     pressure = _pressures(commands, rig, hidden, start, step, once=True)[0]
     none = np.zeros_like(load)
-    order = commands.order
-    moment = Moment(step, rig, none, order, none, none, none, none, pressure, pressure, load, load)
+    moment = Moment(
+        step, rig, none, commands.order, none, none, none, none, pressure, pressure, load, load
+    )
     moment.resting = resting = _balance(moment, none, hidden)
     # A ripple changes the load with the angle, the angle with the load: a few rounds settle it.
     for _ in range(12):
@@ -118,9 +118,11 @@ def _integrate(moment: Moment, hidden: Sequence[Hidden], loads: Array, asked: Ar
         moment.pressure = pressure = moment.pressure + half * rate
         moment.contraction = contraction = moment.contraction + half * moment.velocity
         moment.angle = angle = moment.angle + half * moment.spin
-        stretch = rig["radius"] * angle + contraction - moment.resting - slack
-        stretch_rate = rig["radius"] * moment.spin + moment.velocity
-        moment.tension = pulled = tension(stretch, stretch_rate, rig)
+        moment.tension = pulled = tension(
+            rig["radius"] * angle + contraction - moment.resting - slack,
+            rig["radius"] * moment.spin + moment.velocity,
+            rig,
+        )
         force = rig["force_slope"] * pressure + rig["force_intercept"] - pulled
         force = force - stiffness(pressure, rig) * contraction
         damping = resistance(pressure, moment.velocity, rig)

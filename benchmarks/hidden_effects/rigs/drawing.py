@@ -4,15 +4,15 @@ Effects that a rig may hide, with their first and largest sizes.
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Protocol, Self
+from typing import Any
 
 import numpy as np
 
 from benchmarks.hidden_effects.rigs import laws
-from benchmarks.hidden_effects.rigs.driven_campaign import draw_driven
-from benchmarks.hidden_effects.rigs.imposed_campaign import draw_tested
+from benchmarks.hidden_effects.rigs.driven_campaign import DrivenCampaign, draw_driven
+from benchmarks.hidden_effects.rigs.imposed_campaign import ImposedCampaign, draw_tested
 from benchmarks.hidden_effects.rigs.laws import HiddenEffect
 from benchmarks.hidden_effects.rigs.rig import ImposedRig, Rig, log_uniform
 
@@ -52,8 +52,7 @@ def _by_position(rng: np.random.Generator, rig: AnyRig) -> HiddenEffect:
 
 def _by_pressure(rng: np.random.Generator, rig: AnyRig) -> HiddenEffect:
     assert isinstance(rig, ImposedRig)
-    slope = rng.uniform(0.5, 3.0) / max(rig.pressures)
-    return laws.PressureFriction(0.3 * rig.peak_force, slope)
+    return laws.PressureFriction(0.3 * rig.peak_force, rng.uniform(0.5, 3.0) / max(rig.pressures))
 
 
 def _cogging(rng: np.random.Generator, rig: AnyRig) -> HiddenEffect:
@@ -110,8 +109,9 @@ def _detent(rng: np.random.Generator, rig: AnyRig) -> HiddenEffect:
 
 def _brake(rng: np.random.Generator, rig: AnyRig) -> HiddenEffect:
     place, width = rng.uniform(-0.5, 0.5), rng.uniform(0.1, 0.2)
-    size = 1.5 * rig.peak_force / rig.peak_speed
-    return laws.EddyBrake(size, rig.travel * place, rig.travel * width)
+    return laws.EddyBrake(
+        1.5 * rig.peak_force / rig.peak_speed, rig.travel * place, rig.travel * width
+    )
 
 
 OUTSIDE: tuple[Offer, ...] = (Offer(_bumper), Offer(_detent), Offer(_brake))
@@ -211,30 +211,8 @@ TRIES = 12
 """Draws of an effect until one is visible on a rig."""
 
 
-class Campaign(Protocol):
-    """One rig and what a lab logs of it."""
-
-    @property
-    def rig(self) -> Any:  # noqa: ANN401
-        """The rig, with its `kind`."""
-        ...
-
-    def ratio(self, effect: HiddenEffect) -> float:
-        """Size r of an effect."""
-        ...
-
-    def within_range(self, effects: Sequence[HiddenEffect]) -> Self:
-        """The same, so that the rig stays in its range with what it hides."""
-        ...
-
-    def texts(self, effects: Sequence[HiddenEffect]) -> dict[str, str]:
-        """Texts of the lab's folder by name."""
-        ...
-
-    def truth(self) -> dict[str, Any]:
-        """What is true besides the effects."""
-        ...
-
+Campaign = DrivenCampaign | ImposedCampaign
+"""One rig and what a lab logs of it."""
 
 DRAWN = {"slide": draw_driven, "joint": draw_driven, "imposed": draw_tested}
 """How campaigns of each kind of rig are drawn."""

@@ -8,10 +8,16 @@ from typing import Any
 import numpy as np
 
 from benchmarks.hidden_effects.rigs import effect_size, files
-from benchmarks.hidden_effects.rigs.excitation import Reference, draw_lengths, draw_reference
 from benchmarks.hidden_effects.rigs.files import draw_names
 from benchmarks.hidden_effects.rigs.laws import HiddenEffect
-from benchmarks.hidden_effects.rigs.rig import Rig, draw_joint, draw_slide
+from benchmarks.hidden_effects.rigs.rig import (
+    Reference,
+    Rig,
+    draw_joint,
+    draw_lengths,
+    draw_reference,
+    draw_slide,
+)
 from benchmarks.hidden_effects.rigs.sensing import Sensed, Sensor, draw_sensor
 from benchmarks.hidden_effects.rigs.simulators import mujoco_axis, stick_slip
 from benchmarks.hidden_effects.rigs.simulators.drive import Transmission
@@ -225,13 +231,13 @@ class DrivenCampaign:
 
     def _mujoco_step(self) -> float:
         """Longest step whose errors the sensor does not tell (s)."""
-        acceleration = self.rig.peak_force / self.rig.inertia
-        return mujoco_axis.step_within(ERROR_SHARE * self.sensor.rms, acceleration)
+        return mujoco_axis.step_within(
+            ERROR_SHARE * self.sensor.rms, self.rig.peak_force / self.rig.inertia
+        )
 
     def _noise(self, i: int) -> np.ndarray:
         rng = np.random.default_rng((*self.seed, i, 7))
-        rows = np.arange(len(self.references[i].q))
-        return self.sensor.noise.draw(rng, rows / self.rig.rate)
+        return self.sensor.noise.draw(rng, np.arange(len(self.references[i].q)) / self.rig.rate)
 
 
 def draw_driven(

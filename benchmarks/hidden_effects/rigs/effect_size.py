@@ -134,8 +134,13 @@ def _responses(rig: Rig, motion: Motion, exact: Array, rows: int, count: int) ->
     q, v, a = motion.q, motion.v, motion.a
     weight = rig.gravity * np.sin(q + rig.gravity_angle)
     lacking = rig.inertia * a + rig.damping * v + rig.stiffness * q + weight - motion.command
-    forces = [lacking, a, v, q if rig.stiffness else 0.0 * q]
-    forces += [np.sin(q + rig.gravity_angle), np.cos(q)] if rig.gravity else [0.0 * q, 0.0 * q]
+    forces = [
+        lacking,
+        a,
+        v,
+        q if rig.stiffness else 0.0 * q,
+        *([np.sin(q + rig.gravity_angle), np.cos(q)] if rig.gravity else [0.0 * q, 0.0 * q]),
+    ]
     shaped = np.array(forces)[:, : count * rows].reshape(len(forces), count, rows)
     stiffness = rig.stiffness + rig.gravity * np.cos(q + rig.gravity_angle)
     stiffness = stiffness[: count * rows].reshape(count, rows)

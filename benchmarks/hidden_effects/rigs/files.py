@@ -87,8 +87,7 @@ def folder(
         names: that the lab has for its columns.
     """
     texts = {_name(i): _csv(rate, table, names) for i, table in enumerate(tables)}
-    lines = ['title = "Logs of a drive"', 'model = "model.toml"']
-    lines += names.lines(list(tables[0]))
+    lines = ['title = "Logs of a drive"', 'model = "model.toml"', *names.lines(list(tables[0]))]
     if tolerance:
         lines += ["", "[tolerance]", *(f"{key} = {_number(x)}" for key, x in tolerance.items())]
     for i in range(len(tables)):
@@ -155,7 +154,6 @@ velocity_mm_per_s = 0.0
 
 def _joint(rig: Rig, limit: float) -> str:
     """Of a joint under a torque, with a weight and a spring where the lab knows of them."""
-    del limit
     text = f"""schema = 1
 name = "lab"
 title = "What the lab believes"

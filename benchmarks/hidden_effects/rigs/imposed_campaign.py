@@ -8,9 +8,15 @@ import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
 from benchmarks.hidden_effects.rigs import files
-from benchmarks.hidden_effects.rigs.excitation import Reference, draw_lengths, draw_reference
 from benchmarks.hidden_effects.rigs.laws import Backlash, HiddenEffect
-from benchmarks.hidden_effects.rigs.rig import ImposedRig, draw_imposed, log_uniform
+from benchmarks.hidden_effects.rigs.rig import (
+    ImposedRig,
+    Reference,
+    draw_imposed,
+    draw_lengths,
+    draw_reference,
+    log_uniform,
+)
 from benchmarks.hidden_effects.rigs.sensing import Sensor, draw_noise
 from benchmarks.hidden_effects.rigs.simulators import imposed_force, mujoco_force
 
@@ -72,7 +78,6 @@ class ImposedCampaign:
 
     def within_range(self, effects: Sequence[HiddenEffect]) -> "ImposedCampaign":
         """The same: the machine holds its motion against any force."""
-        del effects
         return self
 
     def tables(self, effects: Sequence[HiddenEffect]) -> list[files.Table]:
@@ -108,8 +113,7 @@ class ImposedCampaign:
         motion = -1e3 * self.motions[i].q
         table = {MOTION: (motion, files.digits(1e-6 * 1e3 * self.rig.travel))}
         if self.rig.area:
-            kpa = np.full(len(force), self.rig.pressures[i] / 1e3)
-            table["pressure_command_kpa"] = (kpa, 1)
+            table["pressure_command_kpa"] = (np.full(len(force), self.rig.pressures[i] / 1e3), 1)
         return table | {FORCE: (read, files.digits(self.cell.step))}
 
 
@@ -117,7 +121,6 @@ def draw_tested(
     rng: np.random.Generator, kind: str, simulator: str, seed: Sequence[int]
 ) -> ImposedCampaign:
     """A campaign with a seal, a brake or a spring."""
-    del kind
     count = int(rng.integers(3, 7))
     rig = draw_imposed(rng, count)
     lengths = draw_lengths(rng, rig.rate, rig.frequency)

@@ -23,12 +23,10 @@ class HiddenEffect:
 
     def force(self, q: float, v: float, u: float) -> float:
         """Force on the axis besides dry friction (N, N m), at position, speed and drive force."""
-        del q, v, u
         return 0.0
 
     def kinetic(self, q: float, v: float, u: float) -> float:
         """Level of dry friction while it slips (N, N m), at least 0."""
-        del q, v, u
         return 0.0
 
     def static(self, q: float, u: float) -> float:
@@ -77,7 +75,6 @@ class CoulombFriction(HiddenEffect):
     name: ClassVar[str] = "coulomb_friction"
 
     def kinetic(self, q: float, v: float, u: float) -> float:  # noqa: D102
-        del q, u
         return self.size * (1.0 + self.rise / (1.0 + (v / self.stribeck) ** 2))
 
 
@@ -88,7 +85,6 @@ class LoadFriction(HiddenEffect):
     name: ClassVar[str] = "load_dependent_friction"
 
     def kinetic(self, q: float, v: float, u: float) -> float:  # noqa: D102
-        del q, v
         return self.size * abs(u)
 
 
@@ -101,7 +97,6 @@ class PressureFriction(HiddenEffect):
 
     def kinetic(self, q: float, v: float, u: float) -> float:  # noqa: D102
         # An imposed motion has a pressure where a driven one has the force of its drive.
-        del q, v
         return self.size * (1.0 + self.slope * u)
 
 
@@ -113,7 +108,6 @@ class PositionFriction(HiddenEffect):
     name: ClassVar[str] = "position_dependent_friction"
 
     def kinetic(self, q: float, v: float, u: float) -> float:  # noqa: D102
-        del v, u
         return self.size * max(0.0, 1.0 + self.slope * q)
 
 
@@ -124,7 +118,6 @@ class ConstantForce(HiddenEffect):
     name: ClassVar[str] = "constant_force"
 
     def force(self, q: float, v: float, u: float) -> float:  # noqa: D102
-        del q, v, u
         return self.size
 
 
@@ -136,7 +129,6 @@ class Gravity(HiddenEffect):
     name: ClassVar[str] = "gravity"
 
     def force(self, q: float, v: float, u: float) -> float:  # noqa: D102
-        del v, u
         return -self.size * math.sin(q + self.angle)
 
 
@@ -147,7 +139,6 @@ class Spring(HiddenEffect):
     name: ClassVar[str] = "spring"
 
     def force(self, q: float, v: float, u: float) -> float:  # noqa: D102
-        del v, u
         return -self.size * q
 
 
@@ -158,7 +149,6 @@ class HardeningSpring(HiddenEffect):
     name: ClassVar[str] = "hardening_spring"
 
     def force(self, q: float, v: float, u: float) -> float:  # noqa: D102
-        del v, u
         return -self.size * q**3
 
 
@@ -169,7 +159,6 @@ class QuadraticDrag(HiddenEffect):
     name: ClassVar[str] = "quadratic_drag"
 
     def force(self, q: float, v: float, u: float) -> float:  # noqa: D102
-        del q, u
         return -self.size * v * abs(v)
 
 
@@ -180,7 +169,6 @@ class DirectionalDamping(HiddenEffect):
     name: ClassVar[str] = "directional_damping"
 
     def force(self, q: float, v: float, u: float) -> float:  # noqa: D102
-        del q, u
         return -self.size * max(v, 0.0)
 
 
@@ -193,7 +181,6 @@ class Cogging(HiddenEffect):
     name: ClassVar[str] = "cogging"
 
     def force(self, q: float, v: float, u: float) -> float:  # noqa: D102
-        del v, u
         return self.size * math.sin(2.0 * math.pi * q / self.period + self.phase)
 
 
@@ -256,7 +243,6 @@ class EndBumper(HiddenEffect):
     name: ClassVar[str] = "outside: bumper at one end"
 
     def force(self, q: float, v: float, u: float) -> float:  # noqa: D102
-        del v, u
         return -self.size * max(q - self.at, 0.0)
 
 
@@ -269,7 +255,6 @@ class Detent(HiddenEffect):
     name: ClassVar[str] = "outside: one detent"
 
     def force(self, q: float, v: float, u: float) -> float:  # noqa: D102
-        del v, u
         place = (q - self.at) / self.width
         return -self.size * place * math.exp(0.5 - 0.5 * place * place)
 
@@ -283,7 +268,6 @@ class EddyBrake(HiddenEffect):
     name: ClassVar[str] = "outside: brake on a part of the stroke"
 
     def force(self, q: float, v: float, u: float) -> float:  # noqa: D102
-        del u
         place = (q - self.at) / self.width
         return -self.size * v * math.exp(-0.5 * place * place)
 

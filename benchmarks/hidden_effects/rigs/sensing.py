@@ -72,8 +72,7 @@ class Noise:
     def _drifting(self, rng: np.random.Generator, time: Array) -> Array:
         """Half a wave to one and a half over the file, from 0 at its start."""
         turns, phase = rng.uniform(0.5, 1.5), rng.uniform(0.0, 2.0 * math.pi)
-        span = max(float(time[-1]), 1e-9)
-        wave = np.sin(2.0 * math.pi * turns * time / span + phase)
+        wave = np.sin(2.0 * math.pi * turns * time / max(float(time[-1]), 1e-9) + phase)
         return self.drift * wave / max(float(np.std(wave)), 1e-9)
 
     def _coloured(self, rng: np.random.Generator, time: Array) -> Array:
@@ -148,8 +147,7 @@ class Sensed:
         row = len(self.exact)
         play, delay = (sum(getattr(r, key) for r in self.between) for key in ("play", "delay"))
         if row and play:
-            before = self._past[-1]
-            q = min(max(before, q - 0.5 * play), q + 0.5 * play)
+            q = min(max(self._past[-1], q - 0.5 * play), q + 0.5 * play)
         self._past.append(q)
         place = max(row - delay / self.interval, 0.0)
         first = int(place)

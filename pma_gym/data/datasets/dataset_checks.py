@@ -115,8 +115,7 @@ def _largest(values: Array | None) -> float:
         return 0.0
     sizes = np.sort(np.abs(values[np.isfinite(values)]))
     # Of few readings all but the largest are the bulk.
-    last = min(int(np.ceil(_BULK * sizes.size)), max(sizes.size - 1, 1))
-    return float(sizes[last - 1])
+    return float(sizes[min(int(np.ceil(_BULK * sizes.size)), max(sizes.size - 1, 1)) - 1])
 
 
 def _moved(file_key: dict[str, Array], quantity: str) -> str:
@@ -182,8 +181,9 @@ def _load(file_key: dict[str, Array]) -> _Slip | None:
         return None
     for unit, factor in (("kilonewtons", 1e3), ("millinewtons", 1e-3)):
         if 1 / _FACTOR < measured * factor / asked < _FACTOR:
-            seen = f"reaches {measured:.3g} N where {asks} about {asked:.3g} N"
-            return _Slip("load", seen, unit, factor)
+            return _Slip(
+                "load", f"reaches {measured:.3g} N where {asks} about {asked:.3g} N", unit, factor
+            )
     return None
 
 

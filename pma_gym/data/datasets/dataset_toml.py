@@ -6,10 +6,10 @@ The table `[format]` of a `dataset.toml`, read and checked.
 import codecs
 import math
 import reprlib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from pma_gym.data.datasets.lab_sensors import MOST_SIZE, LabSensor, lab_sensors
 from pma_gym.data.readers.table import PART, FileFormat, shown
@@ -19,15 +19,57 @@ from pma_gym.documents import is_file, read_toml
 from pma_gym.units import SI_FACTORS
 
 _SEPARATORS = {",": ",", ";": ";", "\t": "\t", "|": "|", " ": " ", "tab": "\t", "blanks": " "}
-_FORMAT_KEYS = (
-    "separator",
-    "decimal",
-    "encoding",
-    "header_row",
-    "names",
-    "missing",
-    "interpolation",
-)
+
+
+class _Key(NamedTuple):
+    """A key of `[format]`: what it must be, for messages and as a test, and what is made of it."""
+
+    rule: str
+    example: str
+    fits: Callable[[Any], object]
+    value: Callable[[Any], Any] = lambda value: value
+
+
+def _one_of(*known: str) -> tuple[str, str, Callable[[Any], object]]:
+    return f"one of {', '.join(map(repr, known))}", repr(known[0]), lambda value: value in known
+
+
+def _is_text_encoding(name: object) -> bool:
+    """Whether a codec makes text of bytes: not "zip", nor those of internet names."""
+    try:
+        # The bytes need not be text in it.
+        b"aaaa".decode(codecs.lookup(str(name)).name, "replace")
+    except (LookupError, ValueError):
+        return False
+    return codecs.lookup(str(name)).name not in ("idna", "punycode", "undefined")
+
+
+def _listed(value: Any) -> list[Any]:  # noqa: ANN401
+    return value if isinstance(value, list) else [value]
+
+
+_FORMAT = {
+    "separator": _Key(*_one_of(*_SEPARATORS), _SEPARATORS.get),
+    "decimal": _Key(*_one_of(".", ",")),
+    "encoding": _Key("the name of a text encoding", '"cp1252"', _is_text_encoding),
+    "header_row": _Key(
+        "a row's number, counted from 1", "3", lambda value: type(value) is int and value > 0
+    ),
+    "names": _Key(
+        "a list of texts",
+        '["time_s", "motor_voltage_v"]',
+        lambda value: value and isinstance(value, list) and {*map(type, value)} == {str},
+        lambda value: tuple(name.strip() for name in value),
+    ),
+    "missing": _Key(
+        "a list of numbers",
+        "[-999]",
+        # A whole number of TOML may be beyond the doubles.
+        lambda value: all(type(x) in (int, float) and abs(x) < 1e308 for x in _listed(value)),
+        lambda value: tuple(map(float, _listed(value))),
+    ),
+    "interpolation": _Key(*_one_of("foh", "zoh")),
+}
 
 
 def file_format(table: Mapping[str, object]) -> FileFormat:
@@ -41,86 +83,20 @@ def file_format(table: Mapping[str, object]) -> FileFormat:
     Raises:
         TrialError: an unknown key or a value of another kind; the message names both and the rule.
     """
-    for key in table:
-        if key not in _FORMAT_KEYS:
+    _check_keys(f"[format] of {DESCRIPTION}", table, tuple(_FORMAT))
+    for key, value in table.items():
+        rule, example, fits, _ = _FORMAT[key]
+        if not fits(value):
             raise TrialError(
-                f"[format] of dataset.toml takes {', '.join(_FORMAT_KEYS)}, got {shown(key)}"
-                f"{suggestion(key, _FORMAT_KEYS)}; remove or rename it"
+                f"{key} in [format] of {DESCRIPTION} must be {rule}, got {shown(value)}; "
+                f"write {key} = {example}"
             )
-    separator = _choice(table, "separator", tuple(_SEPARATORS))
-    decimal = _choice(table, "decimal", (".", ","))
-    if separator is not None and separator == decimal:
+    if "separator" in table and table["separator"] == table.get("decimal"):
         raise TrialError(
-            f"[format] of dataset.toml gives {separator!r} as separator and as decimal; change one"
+            f"[format] of {DESCRIPTION} gives {table['separator']!r} as separator and as decimal; "
+            "change one"
         )
-    return FileFormat(
-        separator=None if separator is None else _SEPARATORS[separator],
-        decimal=decimal,
-        encoding=_encoding(table.get("encoding")),
-        header_row=_header_row(table.get("header_row")),
-        names=_names(table.get("names")),
-        missing=_missing(table.get("missing")),
-        interpolation=_choice(table, "interpolation", ("foh", "zoh")),
-    )
-
-
-def _choice(table: Mapping[str, object], key: str, known: tuple[str, ...]) -> str | None:
-    value = table.get(key)
-    if value is None or (isinstance(value, str) and value in known):
-        return value
-    raise _wrong(key, f"one of {', '.join(map(repr, known))}", value, f"{key} = {known[0]!r}")
-
-
-def _encoding(value: object) -> str | None:
-    if value is None:
-        return None
-    if isinstance(value, str) and _is_text_encoding(value):
-        return value
-    raise _wrong("encoding", "the name of a text encoding", value, 'encoding = "cp1252"')
-
-
-def _is_text_encoding(name: str) -> bool:
-    """Whether a codec makes text of bytes: not "zip", nor those of internet names."""
-    try:
-        # The bytes need not be text in it.
-        b"aaaa".decode(codecs.lookup(name).name, "replace")
-    except (LookupError, ValueError):
-        return False
-    return codecs.lookup(name).name not in ("idna", "punycode", "undefined")
-
-
-def _header_row(value: object) -> int | None:
-    if value is None or (isinstance(value, int) and not isinstance(value, bool) and value > 0):
-        return value
-    raise _wrong("header_row", "a row's number, counted from 1", value, "header_row = 3")
-
-
-def _names(value: object) -> tuple[str, ...]:
-    if value is None:
-        return ()
-    if isinstance(value, list) and value and all(isinstance(name, str) for name in value):
-        return tuple(name.strip() for name in value)
-    raise _wrong("names", "a list of texts", value, 'names = ["time_s", "motor_voltage_v"]')
-
-
-def _missing(value: object) -> tuple[float, ...]:
-    if value is None:
-        return ()
-    out: list[float] = []
-    for number in value if isinstance(value, list) else [value]:
-        if isinstance(number, bool) or not isinstance(number, int | float):
-            raise _wrong("missing", "a list of numbers", value, "missing = [-999]")
-        # A whole number of TOML may be beyond the doubles.
-        if not -1e308 < number < 1e308:
-            raise _wrong("missing", "a list of finite numbers", value, "missing = [-999]")
-        out.append(float(number))
-    return tuple(out)
-
-
-def _wrong(key: str, rule: str, value: object, example: str) -> TrialError:
-    return TrialError(
-        f"{key} in [format] of dataset.toml must be {rule}, got {shown(value)}; write {example}"
-    )
+    return FileFormat(**{key: _FORMAT[key].value(value) for key, value in table.items()})
 
 
 DESCRIPTION = "dataset.toml"

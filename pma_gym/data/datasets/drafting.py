@@ -14,10 +14,9 @@ from numpy.typing import NDArray
 from pma_gym.data.datasets.dataset_files import list_files, read_files
 from pma_gym.data.datasets.dataset_toml import Description
 from pma_gym.data.files.trial_hints import FACTORS, looks_like
-from pma_gym.data.readers.cells import cell_number, decimal_mark
 from pma_gym.data.readers.clock import clock_seconds
 from pma_gym.data.readers.layout import unit_of
-from pma_gym.data.readers.table import Table
+from pma_gym.data.readers.table import Table, cell_number, decimal_mark
 from pma_gym.data.signals import SIGNALS
 from pma_gym.data.trial_columns import BY_NAME, RAW_COLUMNS, Column
 

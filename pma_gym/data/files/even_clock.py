@@ -114,8 +114,7 @@ def _quantum(since: Array) -> float | None:
 def _counts(steps: Array, long: float) -> Array:
     """How many steps of the clock lie before each stamp: one a row, more where rows are missing."""
     gaps = steps > long
-    runs = np.split(steps, np.flatnonzero(gaps))
-    whole = max(runs, key=len)
+    whole = max(np.split(steps, np.flatnonzero(gaps)), key=len)
     mean = float(np.mean(whole[whole <= long]))
     each = np.where(gaps, np.maximum(1.0, np.rint(steps / mean)), 1.0)
     return np.concatenate([[0.0], np.cumsum(each)])

@@ -20,8 +20,7 @@ from pma_gym.data.files.trial_formats import ENCODERS
 from pma_gym.data.files.trial_hints import looks_like, mapping_line
 from pma_gym.data.files.trial_loading import load_table
 from pma_gym.data.files.trial_values import TrialWarning, check_units, file_values, warn
-from pma_gym.data.readers.cells import decimal_mark
-from pma_gym.data.readers.table import FileFormat, Table, UnreadableError, shown
+from pma_gym.data.readers.table import FileFormat, Table, UnreadableError, decimal_mark, shown
 from pma_gym.data.trial import Trial
 from pma_gym.data.trial_checks import check_commanded, check_time
 from pma_gym.data.trial_columns import (

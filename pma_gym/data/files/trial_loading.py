@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 
 from pma_gym.data.files.trial_formats import DECODERS
-from pma_gym.data.readers.cells import cell_number, decimal_mark
 from pma_gym.data.readers.table import (
     PART,
     Cells,
@@ -17,6 +16,8 @@ from pma_gym.data.readers.table import (
     Request,
     Table,
     UnreadableError,
+    cell_number,
+    decimal_mark,
 )
 from pma_gym.data.trial_columns import ColumnMap, TrialError, suggestion
 from pma_gym.files import as_path
@@ -44,8 +45,7 @@ def known_suffix(path: Path) -> str:
 def split_part(path: str | os.PathLike[str]) -> tuple[Path, str]:
     """A file, and the part of it that a name like `march.xlsx#run2` means; "" for all of it."""
     whole = as_path(path, TrialError)
-    text = os.fspath(path)
-    name, mark, part = text.partition(PART)
+    name, mark, part = os.fspath(path).partition(PART)
     while mark:
         if Path(name).suffix.lower() in DECODERS and Path(name).is_file() and not whole.is_file():
             return Path(name), part

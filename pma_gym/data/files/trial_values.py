@@ -11,10 +11,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pma_gym.data.files.trial_hints import mapping_line
-from pma_gym.data.readers.cells import cell_number, has_groups, looks_ambiguous
 from pma_gym.data.readers.clock import clock_seconds, epoch_seconds
 from pma_gym.data.readers.layout import unit_factor
-from pma_gym.data.readers.table import Cells, FileFormat, Table, shown
+from pma_gym.data.readers.table import (
+    Cells,
+    FileFormat,
+    Table,
+    cell_number,
+    has_groups,
+    looks_ambiguous,
+    shown,
+)
 from pma_gym.data.trial_checks import check_values
 from pma_gym.data.trial_columns import ColumnMap, Source, TrialError
 
@@ -268,8 +275,7 @@ def _beyond_fix(source: Source, theirs: NDArray[np.float64], values: NDArray[np.
     )
     clip = f"log what reached the drive, or clip to it: {line}{kept}limit = [{low:g}, {high:g}] }}"
     reach = float(np.max(np.abs(values[there]))) / high
-    counts = bool(np.all(theirs[there] == np.rint(theirs[there]))) and reach > _FAR_BEYOND
-    if counts:
+    if bool(np.all(theirs[there] == np.rint(theirs[there]))) and reach > _FAR_BEYOND:
         return f"the log looks like raw DAQ counts: {factor}"
     if column.kind != "command":
         return f"if the log is in another unit, {factor}; else correct the reading"

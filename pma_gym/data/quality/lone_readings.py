@@ -82,8 +82,7 @@ class LoneReadings:
 def without_lone_readings(trials: Sequence[Trial]) -> tuple[list[Trial], list[str]]:
     """Return the trials without isolated outliers, and a message for each signal with some."""
     kept, messages = list(trials), []
-    names = dict.fromkeys(name for trial in trials for name in trial.measurements)
-    for quantity in names:
+    for quantity in dict.fromkeys(name for trial in trials for name in trial.measurements):
         lone = _lone(trials, quantity)
         if lone is None:
             continue
@@ -110,8 +109,7 @@ def _lone(trials: Sequence[Trial], quantity: str) -> LoneReadings | None:
     known = np.concatenate([each[np.isfinite(each)] for each in apart.values()] or [np.empty(0)])
     if known.size < LEAST_ROWS:
         return None
-    squares = np.sort(known**2)[: int(USUAL * known.size)]
-    noise = float(np.sqrt(np.mean(squares) / USUAL_SQUARE))
+    noise = float(np.sqrt(np.mean(np.sort(known**2)[: int(USUAL * known.size)]) / USUAL_SQUARE))
     limit = max(ALONE * noise, STEPS * _step(trials, quantity))
     rows = {
         number: _alone(trials[number].measurements[quantity], each, limit, noise / SPREAD)
@@ -234,8 +232,7 @@ def outliers(values: Values, place: Callable[[int], str]) -> Iterator[str]:
             continue
         readings = all_values[finite]
         low, high = np.quantile(readings, [_FEW, 1.0 - _FEW], method="nearest")
-        away = np.maximum(low - readings, readings - high)
-        at = finite[away > _FAR * (high - low)]
+        at = finite[np.maximum(low - readings, readings - high) > _FAR * (high - low)]
         if not at.size or high == low or at.size > max(1.0, _FEW * finite.size):
             continue
         # A short pulse is a signal; it lasts longer than a reading.

@@ -13,8 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pma_gym.data.readers.cells import cell_number
-from pma_gym.data.readers.table import Cells, Request
+from pma_gym.data.readers.table import Cells, Request, cell_number
 from pma_gym.data.trial_columns import TrialError
 
 _NS = 1_000_000_000

@@ -69,8 +69,7 @@ class _Members:
             address = self._h5py.h5o.get_info(group[key].id).addr
             if address not in self._seen:
                 self._seen.add(address)
-                value = self._value(group[key], depth)
-                out |= _field(name, value, _frame_names(group, name))
+                out |= _field(name, self._value(group[key], depth), _frame_names(group, name))
         return out
 
     def _value(self, member: Any, depth: int) -> Variable:  # noqa: ANN401

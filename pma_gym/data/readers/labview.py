@@ -11,10 +11,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pma_gym.data.readers.cells import cell_number
 from pma_gym.data.readers.clock import Channel, clock_seconds, on_rows, reference_times
 from pma_gym.data.readers.layout import Row, arrange, check_widths, split_lines
-from pma_gym.data.readers.table import Request, Table, UnreadableError
+from pma_gym.data.readers.table import Request, Table, UnreadableError, cell_number
 from pma_gym.limits import check_limit
 
 END = "***end_of_header***"
@@ -53,8 +52,7 @@ def read_labview(text: str, file: str, request: Request) -> list[Table]:
     Raises:
         TrialError: no segment, or rows that are no table.
     """
-    lines = split_lines(text, file)
-    header, segments = _segments(lines, file, request)
+    header, segments = _segments(split_lines(text, file), file, request)
     request = _with_decimal(request, header)
     tables = [
         _table(segment, f"{file}#{number}" if len(segments) > 1 else file, request, number)
@@ -115,8 +113,7 @@ def _separator(header: Sequence[str], lines: Sequence[str]) -> str:
 
 def _header_start(cells: Sequence[Sequence[str]], ends: Sequence[int], n: int) -> int:
     """First line of the n-th header: `Channels` begins it, below the samples before."""
-    floor = ends[n - 1] + 1
-    lowest = max(floor, ends[n] - _LONGEST_HEADER)
+    lowest = max(ends[n - 1] + 1, ends[n] - _LONGEST_HEADER)
     for i in range(ends[n] - 1, lowest - 1, -1):
         if cells[i][0].lower() == "channels":
             return i

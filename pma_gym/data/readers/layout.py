@@ -10,9 +10,17 @@ import re
 from collections.abc import Mapping, Sequence
 
 from pma_gym.data.files.trial_hints import FACTORS
-from pma_gym.data.readers.cells import bare_text, cell_number, decimal_mark
 from pma_gym.data.readers.clock import looks_like_clock
-from pma_gym.data.readers.table import NoHeaderError, Request, Table, ranges, shown
+from pma_gym.data.readers.table import (
+    NoHeaderError,
+    Request,
+    Table,
+    bare_text,
+    cell_number,
+    decimal_mark,
+    ranges,
+    shown,
+)
 from pma_gym.data.trial_columns import Column, TrialError
 from pma_gym.limits import check_limit, limit
 

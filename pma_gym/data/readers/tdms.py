@@ -31,8 +31,7 @@ def read(content: bytes, file: str, request: Request) -> list[Table]:
         TrialError: npTDMS is missing, or a channel fits no row.
         LimitError: beyond a limit.
     """
-    nptdms = needed("nptdms", file)
-    with nptdms.TdmsFile.open(io.BytesIO(content)) as source:
+    with needed("nptdms", file).TdmsFile.open(io.BytesIO(content)) as source:
         groups = [group for group in source.groups() if any(len(c) for c in group.channels())]
         check_limit(file, "sheets", len(groups))
         tables = []

@@ -23,10 +23,11 @@ from benchmarks.executors.executor import ProcessDied, ThisProcess
 from benchmarks.runner import fingerprint, provenance
 from benchmarks.runner.case import cases, failed_row
 from benchmarks.runner.execution import execute, pending_cases
-from benchmarks.runner.journal import JOURNAL, Journal, read_rows
+from benchmarks.runner.journal import JOURNAL, Journal, case_rows
 from benchmarks.runner.provenance import finished_rows, read_run
 from benchmarks.suites.frozen import frozen_suite
 from benchmarks.suites.suite import SuiteError
+from tests.fuzz.test_fuzz_documents import ROW
 
 ONE = ThisProcess()
 ROOT = Path(__file__).parents[3]
@@ -107,11 +108,11 @@ def test_a_run_that_is_interrupted_and_killed_ends_as_if_it_had_not_been(suite, 
     assert not (out / SCORES).exists()
     with (out / JOURNAL).open("ab") as journal:
         journal.write(b'{"suite": "small", "versi')
-    before = sum(1 for _ in read_rows(out / JOURNAL))
+    before = sum(1 for _ in case_rows(out / JOURNAL))
     code, words = run(suite, f"pid,{slow}", out)
     assert code == 0 and f"{before} cases are done" in words
     # No case ran twice.
-    assert sum(1 for _ in read_rows(out / JOURNAL)) == 12
+    assert sum(1 for _ in case_rows(out / JOURNAL)) == 12
     whole = tmp_path / "whole"
     assert run(suite, f"pid,{slow}", whole)[0] == 0
     assert len(table(out)) == 12 and table(out) == table(whole)
@@ -131,25 +132,25 @@ def _stop(command, out, rows, how):
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
     ) as process:
         deadline = time.monotonic() + 60
-        while sum(1 for _ in read_rows(out / JOURNAL)) < rows and time.monotonic() < deadline:
+        while sum(1 for _ in case_rows(out / JOURNAL)) < rows and time.monotonic() < deadline:
             time.sleep(0.02)
         process.send_signal(how)
         output, errors = process.communicate(timeout=60)
     done = subprocess.CompletedProcess(command, process.returncode, output, errors)
-    return done, sum(1 for _ in read_rows(out / JOURNAL))
+    return done, sum(1 for _ in case_rows(out / JOURNAL))
 
 
 def test_a_line_torn_by_a_crash_costs_its_case_alone(tmp_path):
     path = tmp_path / JOURNAL
     with Journal(path) as journal:
-        journal.append({"case": 1})
+        journal.append(ROW)
     with path.open("ab") as torn:
-        torn.write(b'{"case": 2, "rm')
-    assert list(read_rows(path)) == [{"case": 1}]
+        torn.write(json.dumps(ROW).encode()[:40])
+    assert list(case_rows(path)) == [ROW]
     with Journal(path) as journal:
-        journal.append({"case": 3})
-    assert list(read_rows(path)) == [{"case": 1}, {"case": 3}]
-    assert list(read_rows(tmp_path / "nothing")) == []
+        journal.append(ROW | {"station": 3})
+    assert list(case_rows(path)) == [ROW, ROW | {"station": 3}]
+    assert list(case_rows(tmp_path / "nothing")) == []
 
 
 def test_only_what_was_made_with_the_same_is_used_again(suite, tmp_path, monkeypatch):
@@ -208,7 +209,7 @@ def test_what_fails_is_a_row_with_its_reason(suite, tmp_path):
     path.write_text(MINE.format(name="Fails", sleep=0.0).replace("self.volts +=", "1 / 0 #"))
     code, words = run(suite, f"{path}:Fails", tmp_path / "out")
     assert code == 1
-    rows = list(read_rows(tmp_path / "out" / JOURNAL))
+    rows = list(case_rows(tmp_path / "out" / JOURNAL))
     assert len(rows) == 6 and len({row["failure"] for row in rows}) == 1
     reason = "act raised ZeroDivisionError: division by zero (line 9 of fails.py, at 0 s)"
     assert rows[0]["failure"] == f"ControllerError: {reason}"

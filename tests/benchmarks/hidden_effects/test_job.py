@@ -15,8 +15,8 @@ from benchmarks.hidden_effects.evaluation import scoring
 from benchmarks.hidden_effects.evaluation.records import measured_text, method_digest
 from benchmarks.hidden_effects.evaluation.rounds import Answer, follow, with_trial
 from benchmarks.hidden_effects.evaluation.targets import RATES
-from benchmarks.hidden_effects.evaluation.verdicts import compare, unanswered
-from benchmarks.hidden_effects.generation.blocks import Block
+from benchmarks.hidden_effects.evaluation.verdicts import compare, no_answer
+from benchmarks.hidden_effects.generation.cases import Block
 from benchmarks.hidden_effects.generation.effect_size import UNTOLD, simulate_variants
 from benchmarks.hidden_effects.generation.effects import KINDS
 from benchmarks.hidden_effects.generation.files import random_experiment
@@ -165,7 +165,7 @@ def test_rates_stand_beside_their_targets():
     right = compare(truth("single", creep), document("effect", ("creep", fitted)))
     wrong = compare(truth("single", creep), document("effect", ("filling", {})))
     weak = compare(truth("single", (*creep[:2], 0.2)), document("agrees"))
-    silent = unanswered(truth("single", creep), "ValueError: no")
+    silent = compare(truth("single", creep), no_answer("ValueError: no"))
     figures = scoring.count([right] * 96 + [wrong, weak, silent, silent])["blocks"]["single"]
     named = figures["rates"]["named right"]
     assert (named["hits"], named["n"], named["target"], named["met"]) == (96, 100, ">= 0.92", True)

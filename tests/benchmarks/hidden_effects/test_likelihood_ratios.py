@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from benchmarks.hidden_effects.evaluation.verdicts import compare, unanswered
+from benchmarks.hidden_effects.evaluation.verdicts import compare, no_answer
 from benchmarks.hidden_effects.generation.cases import SCALED_TOGETHER, draw_case
 from benchmarks.hidden_effects.generation.effect_size import (
     KNOWN,
@@ -69,5 +69,5 @@ def test_cases_tell_of_their_parameters_whether_data_do():
     untold = compare(truth | {"log_odds": {"radius": UNTOLD}}, document("agrees"))
     assert outcome.parameters_tellable and not untold.parameters_tellable
     # What raises counts against the diagnosis, not for it.
-    failed = unanswered(truth, "ValueError")
+    failed = compare(truth, no_answer("ValueError"))
     assert failed.parameters_tellable and not failed.parameters

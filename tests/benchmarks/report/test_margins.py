@@ -19,9 +19,8 @@ from benchmarks.report.margins import (
 )
 from benchmarks.tuning.loop_margins import linearised, sampled
 from controllers.design.designs import Gains
-from controllers.feedforward_pid import FeedforwardPID
-from controllers.improved_feedforward import ImprovedFeedforward
-from controllers.pid import PID, linear_law
+from controllers.pid import PID, FeedforwardPID, linear_law
+from controllers.serres_feedforward import ImprovedFeedforward
 from pma_gym.envs import Measurement, StationInfo
 from pma_gym.plant.model import load_model
 from pma_gym.tasks import TASKS

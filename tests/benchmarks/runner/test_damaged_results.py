@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from benchmarks.hidden_effects.generation.blocks import Block
+from benchmarks.hidden_effects.generation.cases import Block
 from benchmarks.hidden_effects.run_blocks import Order, run_block
 from benchmarks.measured.rounds import Stages
 from benchmarks.runner.journal import JOURNAL, case_rows

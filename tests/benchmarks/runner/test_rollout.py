@@ -5,7 +5,7 @@ import pytest
 
 from benchmarks.executors.choice import local
 from benchmarks.executors.executor import ThisProcess, run_all
-from benchmarks.reproduction.results import csv_text, scores_of
+from benchmarks.reproduction.results import scores_csv, scores_of
 from benchmarks.runner.controller_spec import ControllerError, ControllerSpec
 from benchmarks.runner.execution import execute, pending_cases
 from benchmarks.runner.rollout import make_environment, rollout
@@ -117,7 +117,7 @@ def test_an_array_of_one_volt_is_a_voltage():
 def test_any_number_of_processes_gives_the_same_bits(tmp_path):
     spec = controller_file(tmp_path, "return 2.0 - 10.0 * observation.extension")
     suite = small_suite(spec)
-    texts = [csv_text(scores(suite, tmp_path / str(jobs), local(jobs))) for jobs in (1, 2)]
+    texts = [scores_csv(scores(suite, tmp_path / str(jobs), local(jobs))) for jobs in (1, 2)]
     assert texts[0] == texts[1]
     assert texts[0].count("\n") == 3
 

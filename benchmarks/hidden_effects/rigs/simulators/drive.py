@@ -71,8 +71,7 @@ class Drive:
         breakpoint = part * span
         first = start + (before - start) * part
         if time <= breakpoint:
-            slope = (start - before) / span
-            return _lagged(first, slope, time, self._lagged, lag)
+            return _lagged(first, (start - before) / span, time, self._lagged, lag)
         at_breakpoint = _lagged(first, (start - before) / span, breakpoint, self._lagged, lag)
         return _lagged(start, (end - start) / span, time - breakpoint, at_breakpoint, lag)
 

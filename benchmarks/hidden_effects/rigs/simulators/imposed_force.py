@@ -7,9 +7,8 @@ where the motion is monotone between rows.
 
 import numpy as np
 
-from benchmarks.hidden_effects.rigs.excitation import Reference
 from benchmarks.hidden_effects.rigs.laws import Backlash, HiddenEffect, summed
-from benchmarks.hidden_effects.rigs.rig import ImposedRig
+from benchmarks.hidden_effects.rigs.rig import ImposedRig, Reference
 
 Array = np.ndarray
 

@@ -2,9 +2,8 @@
 
 import numpy as np
 
-from benchmarks.hidden_effects.rigs.excitation import Reference
 from benchmarks.hidden_effects.rigs.laws import HiddenEffect
-from benchmarks.hidden_effects.rigs.rig import ImposedRig, Rig
+from benchmarks.hidden_effects.rigs.rig import ImposedRig, Reference, Rig
 from benchmarks.hidden_effects.rigs.simulators.mujoco_axis import World, mujoco
 
 Array = np.ndarray

@@ -8,9 +8,8 @@ import pytest
 
 from benchmarks.hidden_effects.rigs import laws
 from benchmarks.hidden_effects.rigs.drawing import OFFERS
-from benchmarks.hidden_effects.rigs.excitation import Reference
 from benchmarks.hidden_effects.rigs.imposed_campaign import draw_tested
-from benchmarks.hidden_effects.rigs.rig import ImposedRig, draw_imposed
+from benchmarks.hidden_effects.rigs.rig import ImposedRig, Reference, draw_imposed
 from benchmarks.hidden_effects.rigs.sensing import Noise
 from benchmarks.hidden_effects.rigs.simulators import imposed_force, mujoco_force
 from pma_gym import Plant, load_model
