@@ -171,12 +171,15 @@ def fit(
         information, scores = _scored(box, results, signs)
         gradient = scores.sum(axis=0) - weight * (x - origin)
         information += np.diag(weight)
+        # What is at an end of its range and drawn beyond it takes no part in the step.
+        out = (within(x + STEP * np.sign(gradient)) == x) & (gradient != 0.0)
         scale = np.sqrt(np.maximum(np.diag(information), 1e-12))
         normal = information / np.outer(scale, scale)
+        normal[out, :] = normal[:, out] = 0.0
         steps = []
         for factor in FACTORS:
-            ridge = (damping * factor + 1e-10) * np.eye(p)
-            step = np.linalg.solve(normal + ridge, gradient / scale) / scale
+            ridge = (damping * factor + 1e-10) * np.eye(p) + np.diag(out.astype(float))
+            step = np.linalg.solve(normal + ridge, np.where(out, 0.0, gradient) / scale) / scale
             steps.append(within(x + step * min(1.0, WIDEST / max(np.abs(step).max(), 1e-12))))
         values, _ = valued(steps)
         at = int(np.argmax(values))

@@ -12,8 +12,19 @@ from pma_gym.data.trial_columns import BY_QUANTITY
 from pma_gym.discovery.answer.trial_records import gaps
 from pma_gym.discovery.diagnosis import Diagnosis, Verdict
 from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
-from pma_gym.discovery.fitting.free_parameters import at_limit
-from pma_gym.discovery.report.effect_text import effect_name, effect_names
+from pma_gym.discovery.grey_box.search import Hypothesis, Move, Search, slot
+from pma_gym.discovery.grey_box.thresholds import (
+    CONFIDENCE,
+    HORIZON,
+    HORIZON_S,
+    LEFT,
+    LIKE,
+    MATERIAL,
+    NOISES,
+    ROWS_LATE,
+    SURE,
+)
+from pma_gym.discovery.report.effect_text import effect_names
 from pma_gym.discovery.report.figure_text import (
     estimate_text,
     figure,
@@ -28,21 +39,10 @@ from pma_gym.discovery.result.estimates import Approximate, Estimate, Moved, Nam
 from pma_gym.discovery.result.misfit import Gap, Place, ResidualLaw, TrialRecord
 from pma_gym.discovery.result.noise import Floor
 from pma_gym.effects import CATALOGUE
+from pma_gym.estimation.innovations import TREND, TRIAL, GreyBox, counted, predictions
+from pma_gym.estimation.likelihood_fit import fit, value_of, with_tied, with_values
 from pma_gym.estimation.logged import Logged
-from pma_gym.estimation.innovations import TREND, TRIAL, GreyBox, Point, counted, predictions
-from pma_gym.estimation.likelihood_fit import Fit, fit, value_of, with_tied, with_values
-from pma_gym.discovery.grey_box.search import Hypothesis, Move, Search
 from pma_gym.estimation.smoother import Smoothed, smoothed
-from pma_gym.discovery.grey_box.thresholds import (
-    CONFIDENCE,
-    HORIZON,
-    HORIZON_S,
-    LEFT,
-    LIKE,
-    MATERIAL,
-    NOISES,
-    ROWS_LATE,
-)
 from pma_gym.plant.model import Model
 from pma_gym.units import SI_FACTORS, Quantity
 
@@ -193,6 +193,8 @@ class Found:
         """See `pma_gym.discovery.diagnosis.Verdict`."""
         effects = self.delayed or any(move.candidate for move in self.last.moves)
         material = self.share(self.last) > MATERIAL and self.is_latent
+        if not all(map(self._is_sized, self.last.moves)):
+            return "unknown"
         if material and (self.left > LEFT or not self.last.moves):
             return "unknown"
         if effects:
@@ -202,6 +204,20 @@ class Found:
         if self._within_tolerance() or not self.last.moves and not self._moved:
             return "agrees"
         return "parameters"
+
+    def _is_sized(self, move: Move) -> bool:
+        """Whether some size of an added effect is surely not none."""
+        if move.candidate is None:
+            return True
+        made, candidate = self.last.fit, move.candidate
+        for path, none, size in zip(
+            candidate.paths, candidate.absent, candidate.amplitudes, strict=True
+        ):
+            if (name := slot(path)) in made.deviations and (size or not candidate.amplitudes.any()):
+                absent = _quantity(name).to_si(float(none))
+                if abs(value_of(made.point, name) - absent) > SURE * made.deviations[name]:
+                    return True
+        return False
 
     def _within_tolerance(self) -> bool:
         """Whether the model as it came is within what the lab tolerates, in all signals that it says one for."""
@@ -310,8 +326,9 @@ class Found:
         )
         if TREND not in name:
             low, high = max(low, quantity.lower), min(high, quantity.upper)
-        limit = at_limit(value_, quantity.lower, quantity.upper) if TREND not in name else ""
-        return Estimate(value_, low, high, quantity.unit, limit)
+        coordinate = next(c for c in made.coordinates if c.name == name)
+        ends = {coordinate.lower: "lower", coordinate.upper: "upper"}
+        return Estimate(value_, low, high, quantity.unit, ends.get(value, ""))
 
     @cached_property
     def effects(self) -> tuple[NamedEffect, ...]:
@@ -326,10 +343,13 @@ class Found:
                     for c in self.last.fit.coordinates
                     if c.name.startswith(f"{move.candidate.effect}.")
                 ]
-                sizes = {
-                    path_of(n).partition(".")[2]: self.estimate(n)
-                    for n in names
-                    if n not in own and TRIAL not in n and TREND not in n
+                names = [n for n in names if n not in own and TRIAL not in n and TREND not in n]
+                sizes = {path_of(n).partition(".")[2]: self.estimate(n) for n in names}
+                tied = {n: of for n, of in self.last.fit.tied.items() if of in names}
+                sizes |= {
+                    path_of(n).partition(".")[2]: self.estimate(of)
+                    for n, of in tied.items()
+                    if TRIAL not in n and TREND not in n
                 }
                 alike = tuple(
                     other for other in others if TREND not in other and TRIAL not in other
@@ -343,12 +363,21 @@ class Found:
             made.append(
                 NamedEffect(
                     "drive_delay",
-                    (),
+                    self._late,
                     1e-6,
                     {"delay_ms": Estimate(late, max(late - error, 0.0), late + error, "ms")},
                 )
             )
         return tuple(made)
+
+    @property
+    def _late(self) -> tuple[str, ...]:
+        """What comes to the same as a delay of the command: a lag, and with one signal that of its sensor."""
+        channels = self.last.box.channels
+        sensors = [self.search.model.rig.signals[channel].sensor for channel in channels]
+        late = [f"{sensor}_{kind}" for sensor in sensors for kind in ("delay", "lag")]
+        names = [each.name for each in self.candidates]
+        return tuple(n for n in names if n == "drive_lag" or len(channels) == 1 and n in late)
 
     def _chance(self, move: Move) -> float:
         """Bound of the chance of such a gain over all that was looked for."""
@@ -569,7 +598,7 @@ def diagnosis(found: Found) -> Diagnosis:
     return Diagnosis(
         verdict=found.verdict,
         sentence=found.sentence,
-        where=found.where,
+        where=found.where if last.moves or found.verdict == "unknown" else (),
         effects=found.effects if named else (),
         parameters=found.parameters,
         gap=found.gap,
@@ -583,7 +612,6 @@ def diagnosis(found: Found) -> Diagnosis:
         law=found.law if found.verdict == "unknown" or approximate else None,
         floors=floors,
         states=found.states,
-        written={name: gap.after for name, gap in found.gap.items()},
         trials=found.records,
         steps=(),
     )

@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 
 from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
 from pma_gym.discovery.fitting.free_parameters import free_parameters, prior
+from pma_gym.discovery.grey_box.thresholds import FAINT, LIKE, MOST_EFFECTS, ODD, TRIED
 from pma_gym.effects import CATALOGUE
-from pma_gym.estimation.logged import Logged
 from pma_gym.estimation.innovations import TREND, TRIAL, GreyBox, Point, Rows, log_likelihood
 from pma_gym.estimation.likelihood_fit import (
     STEP,
@@ -20,7 +20,7 @@ from pma_gym.estimation.likelihood_fit import (
     with_tied,
     with_values,
 )
-from pma_gym.discovery.grey_box.thresholds import FAINT, LIKE, MOST_EFFECTS, ODD, TRIED
+from pma_gym.estimation.logged import Logged
 from pma_gym.plant.model import Model
 from pma_gym.units import Quantity
 
@@ -148,7 +148,7 @@ class Search:
             i for i in range(len(model.rig.signals)) if any(each.measures[i] for each in logged)
         ]
         # The delay between command and readings is free in every fit, and a lag of the only sensor is no other thing.
-        late = DELAYS if len(self.channels) > 1 else (*DELAYS, *LAGS)
+        late = DELAYS[:1] if len(self.channels) > 1 else (*DELAYS, *LAGS)
         self.candidates = [each for each in candidates if each.name not in late]
         readings = [
             [each.measured[c][each.counts[c] > 0] for each in logged] for c in self.channels
@@ -174,6 +174,7 @@ class Search:
         longest = max(float(each.time[-1] - each.time[0]) for each in logged)
         self.memory = 4.0 * self.span, max(longest / 5.0, 8.0 * self.span)
         self.gains: dict[str, float] = {}
+        self.noise = [n / self.block**0.5 for n in self.noise]
         self._rows: dict[tuple[int, bool], list[Rows]] = {}
         self.force = self._force()
 
@@ -502,12 +503,13 @@ class Search:
         return Hypothesis(box, best, (*now.moves, move), now.rivals)
 
     def _weaker(self, point: Point, share: float) -> Point:
-        """A point with a share of its latent force, in no trial more than thrice the least one."""
+        """A point with a share of its latent force, in no trial more than thrice the least one, and with no more noise
+        than the readings show: what stood in for an effect makes room for it.
+        """
         most = 3.0 * min(point.forces) if share < 1.0 else max(point.forces)
-        return replace(
-            point,
-            forces=tuple(max(share * min(each, most), 1e-6 * self.force) for each in point.forces),
-        )
+        forces = tuple(max(share * min(each, most), 1e-6 * self.force) for each in point.forces)
+        noise = tuple(map(min, point.deviations, self.noise))
+        return replace(point, forces=forces, deviations=noise)
 
     def _varied(self, now: Hypothesis, move: Move) -> Hypothesis:
         """Fit with a parameter that differs by trial, from more starts where the latent force of that trial stands out."""
@@ -552,7 +554,7 @@ class Search:
             if max(forces) > FAINT * self.force:
                 moves = [*moves[:TRIED], *fresh[:TRIED], *moves[TRIED:]]
                 return moves[: 2 * TRIED] + self._odd(now, moves[2 * TRIED :])
-        readings = sum(int(trial.there.sum()) for trial in now.box.rows)
+        readings = self._readings(now)
         price = 0.5 * (0.5 * np.log(readings) + np.log(len(moves)))
         if max(forces) < FAINT * self.force:
             return [move for move in moves[:TRIED] if move.promise > price]
@@ -576,6 +578,53 @@ class Search:
         return replace(
             base, fit=replace(made, coordinates=base.fit.coordinates, tied=base.fit.tied)
         )
+
+    def _refined(self, now: Hypothesis) -> Hypothesis:
+        """With the simpler laws of the added effects freed where that is worth its price."""
+        for move in now.moves:
+            law = CATALOGUE[move.candidate.effect] if move.candidate else None
+            for row in (*law.ties, *law.terms) if law else ():
+                larger = self._freed(now, move.candidate, row, tie=row in law.ties)
+                gain = larger.fit.value - now.fit.value
+                numbers = len(larger.fit.coordinates) - len(now.fit.coordinates)
+                if gain > 0.5 * numbers * np.log(self._readings(now)) + LIKE:
+                    now = larger
+        return now
+
+    def _freed(
+        self, now: Hypothesis, candidate: CandidateEffect, row: Sequence[str], tie: bool
+    ) -> Hypothesis:
+        """A hypothesis with the parameters of a tie, or of a further term, free."""
+        point, effect = now.fit.point, candidate.effect
+        names = [f"{effect}.{stem}" for stem in (row[1:] if tie else row)]
+        probe = _values(candidate.paths, candidate.probes[len(candidate.probes) // 2])
+        tied = {slot_: of for slot_, of in now.fit.tied.items() if slot_ not in names}
+        more, values = [], {}
+        for path in candidate.paths:
+            if (name := slot(path)) in names and path in candidate.fitted_paths:
+                quantity = _quantity(path)
+                low, high = (quantity.to_si(end) for end in (quantity.lower, quantity.upper))
+                follows = now.fit.tied.get(name)
+                values[name] = 0.8 * point.numbers[follows] if follows else probe[name]
+                more.append(Coordinate(name, abs(values[name]) or 1.0, False, low, high))
+        if not more:
+            return now
+        start = with_values(point, with_tied(values, tied))
+        made = fit(now.box, start, [*now.fit.coordinates, *more], tied)
+        return replace(now, fit=made)
+
+    @staticmethod
+    def _readings(each: Hypothesis) -> int:
+        return sum(int(trial.there.sum()) for trial in each.box.rows)
+
+    def _other_hold(self, now: Hypothesis) -> Hypothesis:
+        """The same hypothesis, with commands between rows the other way if that is likelier."""
+        box = self.box(now.box.model, not self.linear, now.box.rows[0].steps)
+        made = fit(box, now.fit.point, now.fit.coordinates, now.fit.tied)
+        if made.value < now.fit.value + LIKE:
+            return now
+        self.linear = not self.linear
+        return replace(now, box=box, fit=made)
 
     def _at_end(self, each: Hypothesis) -> bool:
         """Whether a parameter of one trial has gone as far as it may."""
@@ -601,7 +650,7 @@ class Search:
 
     def price(self, one: Hypothesis, other: Hypothesis) -> float:
         """Log likelihood that a larger hypothesis must gain over a smaller: BIC's, and that of the search."""
-        readings = sum(int(trial.there.sum()) for trial in one.box.rows)
+        readings = self._readings(one)
         numbers = len(one.fit.coordinates) - len(other.fit.coordinates)
         looked = len(self.candidates) + len(self.logged) * len(self.own()[0])
         moves = len(one.moves) - len(other.moves)
@@ -609,6 +658,7 @@ class Search:
 
     def run(self) -> list[Hypothesis]:
         """From the model as it came to the last hypothesis that is worth its price."""
+        free = self.linear is None
         path = [self.base()]
         self.unmoved = self._unmoved(path[0])
         for stage in range(MOST_EFFECTS):
@@ -633,10 +683,11 @@ class Search:
             if not worth or worth[0].fit.value < now.fit.value + self.price(worth[0], now) + LIKE:
                 break
             least = worth[0].fit.value - self.price(worth[0], now) - LIKE
-            rivals = tuple(
-                h.moves[-1].name for h in worth[1:] if h.fit.value - self.price(h, now) > least
-            )
-            path.append(replace(worth[0], rivals=(*now.rivals, rivals)))
+            near = [h.moves[-1].name for h in worth[1:] if h.fit.value - self.price(h, now) > least]
+            rivals = tuple(name for name in dict.fromkeys(near) if name != worth[0].moves[-1].name)
+            best = self._other_hold(worth[0]) if free else worth[0]
+            path.append(replace(best, rivals=(*now.rivals, rivals)))
+        path[-1] = self._refined(path[-1]) if path[-1].moves else path[-1]
         return path
 
 

@@ -19,7 +19,7 @@ TRIED = 5
 HORIZON = 0.25
 """Share of the shortest trial over which a free rig is predicted ahead, at most `HORIZON_S`."""
 
-HORIZON_S = 1.0
+HORIZON_S = 0.25
 """Longest prediction (s): what a controller of such a rig plans ahead; assumption."""
 
 CONFIDENCE = 1.96
@@ -36,3 +36,6 @@ ROWS_LATE = 0.05
 
 NOISES = 3.0
 """Noises that predictions may miss by where the model is said to be right, as the campaign on hidden effects counts it."""
+
+SURE = 3.0
+"""Standard errors that a size must be from none for its effect to be named: a chance of 1 in 400."""
