@@ -31,7 +31,10 @@ SPEEDS = {"slide": "velocity", "joint": "spin"}
 """The state that is the speed, by rig."""
 
 TREND, TRIAL = "~", "@"
-"""Marks of a parameter's further numbers: `slot~` is its change from trial to trial, `slot@2` its value in trial 2."""
+"""Marks of a parameter's further numbers.
+
+`slot~` is its change from trial to trial, `slot@2` its value in trial 2.
+"""
 
 FIRST_ROWS = 8
 """Readings that a first speed is taken from."""
@@ -98,7 +101,10 @@ _kernels: dict[tuple[str, ...], Kernel] = {}
 
 
 def kernel(model: Model, channels: Sequence[int], keeps: bool = False) -> Kernel:
-    """The compiled filter of a model's structure; one that keeps what a smoother needs has one lane."""
+    """The compiled filter of a model's structure.
+
+    One that keeps what a smoother needs has one lane.
+    """
     width = 1 if keeps else simd_lanes()
     key = ("grey box", *structure(model), *map(str, channels), str(width), str(keeps))
     if key not in _kernels:
@@ -136,7 +142,9 @@ class Point:
 
 
 class Rows:
-    """One trial as the filter reads it: blocks of rows as one reading each, commands as means over steps.
+    """One trial as the filter reads it.
+
+    Blocks of rows as one reading each, commands as means over steps.
 
     Args:
         logged: the trial.
@@ -174,8 +182,11 @@ class Rows:
         spans = np.diff(self.time)
         self.lengths = np.concatenate([[0.0], spans / steps])
         self._motor, self._at = np.asarray(logged.motor, float), np.asarray(logged.time, float)
-        self._linear = linear
-        self._sums = np.concatenate([[0.0], np.cumsum(self._motor[:-1] * np.diff(self._at))])
+        between = np.diff(self._at)
+        rise = np.diff(self._motor) / between if linear else np.zeros(len(between))
+        self._slopes = np.append(rise, 0.0)
+        held = self._motor[:-1] * between + 0.5 * rise * between**2
+        self._sums = np.concatenate([[0.0], np.cumsum(held)])
         edges = self.time[:-1, None] + spans[:, None] * (np.arange(steps + 1) / steps)
         self._from, self._to = edges[:, :-1], edges[:, 1:]
         self._known: dict[float, Array] = {}
@@ -191,26 +202,22 @@ class Rows:
         if delay not in self._known:
             if len(self._known) > MOST_KEPT:
                 self._known.clear()
-            # A linear command is as in the step's middle; one that is held has a linear integral.
-            middle = 0.5 * (self._from + self._to) - delay
-            mean = np.interp(middle, self._at, self._motor) if self._linear else self._mean(delay)
+            first, last = (self._integral(edge - delay) for edge in (self._from, self._to))
+            mean = (last - first) / (self._to - self._from)
             self._known[delay] = np.concatenate([np.full((1, self.steps), self.first), mean])
         return self._known[delay]
 
-    def _mean(self, delay: float) -> Array:
-        first, last = (self._integral(edge - delay) for edge in (self._from, self._to))
-        return (last - first) / (self._to - self._from)
-
     def _integral(self, at: Array) -> Array:
-        inside = np.interp(at, self._at, self._sums)
+        """Integral of the command up to given times; before the first row it is as there."""
+        place = np.interp(at, self._at, np.arange(len(self._at))).astype(int)
+        beyond = at - self._at[place]
         return (
-            inside
-            + self.first * np.minimum(at - self._at[0], 0.0)
-            + self._motor[-1] * np.maximum(at - self._at[-1], 0.0)
+            self._sums[place]
+            + (self._motor[place] + 0.5 * self._slopes[place] * np.maximum(beyond, 0.0)) * beyond
         )
 
     def begin(self, position: int | None, speed: int | None) -> tuple[float, float, float]:
-        """First position, first speed and the speed's standard deviation, from the first readings."""
+        """First position and speed, with the speed's standard deviation, from the first rows."""
         if (position, speed) not in self._begun:
             self._begun[position, speed] = self._first(position, speed)
         return self._begun[position, speed]
@@ -235,7 +242,10 @@ MOST_KEPT = 32
 
 @dataclass(frozen=True)
 class Kept:
-    """What a smoother needs of one trial: means (rows, n), covariances and transitions (rows, n, n)."""
+    """What a smoother needs of one trial.
+
+    Means (rows, n), covariances and transitions (rows, n, n).
+    """
 
     states: tuple[str, ...]
     predicted: Array
@@ -257,7 +267,7 @@ class GreyBox:
     def __init__(self, model: Model, rows: Sequence[Rows], channels: Sequence[int]) -> None:
         self.model, self.rows, self.channels = model, list(rows), tuple(channels)
         self.kernel = kernel(model, channels)
-        self.order = np.arange(len(rows)) - 0.5 * (len(rows) - 1)
+        self.order: Array = np.arange(float(len(rows))) - 0.5 * (len(rows) - 1)
 
     def numbers(self) -> dict[str, float]:
         """The model's own parameters (SI) by slot."""
@@ -365,11 +375,9 @@ class GreyBox:
     def asked(self, command: float) -> float:
         """What the drive asks for at a command (N; else the command itself)."""
         drive = self.model.effects.get("two_way_drive")
-        return (
-            command
-            if drive is None
-            else float(drive.law(command, self.model.parameters[drive.name]))
-        )
+        if drive is None or drive.law is None:
+            return command
+        return float(drive.law(command, self.model.parameters[drive.name]))
 
 
 BRISTLE = 3.0**-0.5
@@ -385,7 +393,10 @@ def counted(rows: Rows, counts: NDArray[np.bool_]) -> Rows:
 
 
 def predictions(box: GreyBox, point: Point, horizon: float) -> list[Array]:
-    """What a filter expects a horizon ahead: each window (s) from the readings of the one before; shape (rows, signals) each."""
+    """What a filter expects a horizon ahead.
+
+    Each window (s) from the readings of the one before; shape (rows, signals) each.
+    """
     expected = []
     windows = [((trial.time - trial.time[0]) / horizon).astype(int) % 2 == 0 for trial in box.rows]
     for odd in (False, True):
@@ -412,7 +423,10 @@ def value_in_trial(point: Point, slot: str, number: int, order: Array) -> float:
 
 
 def log_likelihood(results: Sequence[tuple[Array, Array]], rows: Sequence[Rows]) -> Array:
-    """Log likelihood of each point less a constant, shape (points,); minus infinity where a filter fails."""
+    """Log likelihood of each point less a constant, shape (points,).
+
+    Minus infinity where a filter fails.
+    """
     total = np.zeros(len(results[0][0]))
     with np.errstate(all="ignore"):
         for (errors, spreads), trial in zip(results, rows, strict=True):

@@ -1,8 +1,9 @@
 """Greatest likelihood of the innovations, by Fisher scoring.
 
-The score of a reading with innovation e and variance S is -(e / S) e' - (1 - e^2 / S) S' / (2 S), its expected information
-e' e' / S + S' S' / (2 S^2). Derivatives come from points that lie a small step away, all of them in the lanes of one run; so do
-the steps of eight damping factors (Levenberg and Marquardt), of which the best is taken.
+The score of a reading with innovation e and variance S is -(e / S) e' - (1 - e^2 / S) S' / (2 S),
+its expected information e' e' / S + S' S' / (2 S^2). Derivatives come from points that lie a small
+step away, all of them in the lanes of one run; so do the steps of eight damping factors (Levenberg
+and Marquardt), of which the best is taken.
 """
 
 from collections.abc import Mapping, Sequence
@@ -196,7 +197,7 @@ def fit(
 def _scored(
     box: GreyBox, results: Sequence[tuple[Array, Array]], signs: Array
 ) -> tuple[Array, Array]:
-    """Expected information (p, p) and scores of blocks (blocks, p) from runs at and beside a point."""
+    """Expected information (p, p) and scores (blocks, p) from runs at and beside a point."""
     slopes, sizes = [], []
     with np.errstate(all="ignore"):
         for (errors, spreads), trial in zip(results, box.rows, strict=True):

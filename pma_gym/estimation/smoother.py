@@ -1,4 +1,7 @@
-"""The smoothed latent force of a trial: Rauch, Tung and Striebel's pass from the last row to the first."""
+"""The smoothed latent force of a trial.
+
+Rauch, Tung and Striebel's pass from the last row to the first.
+"""
 
 from dataclasses import dataclass
 
@@ -40,7 +43,8 @@ def smoothed(box: GreyBox, point: Point, number: int) -> Smoothed:
         number: of the trial.
 
     Source:
-        H. E. Rauch, F. Tung, C. T. Striebel 1965, "Maximum likelihood estimates of linear dynamic systems", AIAA Journal 3.
+        H. E. Rauch, F. Tung, C. T. Striebel 1965, "Maximum likelihood estimates of linear dynamic
+        systems", AIAA Journal 3.
     """
     kept, trial = box.kept(number, point), box.rows[number]
     mean, spread = kept.corrected.copy(), kept.certain.copy()

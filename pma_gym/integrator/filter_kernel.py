@@ -1,16 +1,19 @@
 """Compiled extended Kalman filter of a rig: innovations row by row, one parameter vector per lane.
 
-Between two rows mean and covariance move together in short steps of the Rosenbrock method ROS2 (order 2, L-stable), whose
-transition matrix is the exact derivative of the linearised step:
+Between two rows mean and covariance move together in short steps of the Rosenbrock method ROS2
+(order 2, L-stable), whose transition matrix is the exact derivative of the linearised step:
 
-    (I - g h J) k1 = h f(x),   (I - g h J) k2 = h f(x + k1) - 2 k1,   x+ = x + 3/2 k1 + 1/2 k2,   g = 1 - 1/sqrt(2)
+    (I - g h J) k1 = h f(x),   (I - g h J) k2 = h f(x + k1) - 2 k1,   x+ = x + 3/2 k1 + 1/2 k2,   g
+    = 1 - 1/sqrt(2)
 
-Dry friction is the bristle of the catalogue: while it sticks it is a stiff spring, which takes the variance of the speed away by
-itself. At a row the readings correct mean and covariance one after the other.
+Dry friction is the bristle of the catalogue: while it sticks it is a stiff spring, which takes the
+variance of the speed away by itself. At a row the readings correct mean and covariance one after
+the other.
 
 Source:
-    J. G. Verwer, E. J. Spee, J. G. Blom, W. Hundsdorfer 1999, "A second-order Rosenbrock method applied to photochemical dispersion
-    problems", SIAM J. Sci. Comput. 20; A. H. Jazwinski 1970, "Stochastic Processes and Filtering Theory", for the filter.
+    J. G. Verwer, E. J. Spee, J. G. Blom, W. Hundsdorfer 1999, "A second-order Rosenbrock method
+    applied to photochemical dispersion problems", SIAM J. Sci. Comput. 20; A. H. Jazwinski 1970,
+    "Stochastic Processes and Filtering Theory", for the filter.
 """
 
 from collections.abc import Callable, Sequence
@@ -40,7 +43,7 @@ from pma_gym.integrator.integration import memory
 from pma_gym.integrator.step_attempt import _signs, step_start
 
 FULL = 0.9999
-"""Largest deflection of bristles that a correction leaves: at 1 the law of their way has no slope."""
+"""Largest deflection of bristles after a correction: at 1 the law of their way has no slope."""
 
 POLE = 1.0 - 0.5**0.5
 
@@ -248,7 +251,7 @@ def _zero(value: Entry) -> bool:
 
 
 def _times(a: Entry, b: Entry) -> Entry:
-    return None if _zero(a) or _zero(b) else a * b
+    return None if a is None or b is None or _zero(a) or _zero(b) else a * b
 
 
 def _plus(a: Entry, b: Entry) -> Entry:
@@ -264,9 +267,10 @@ def _minus(a: Entry) -> Entry:
 ARGUMENTS = ("times", "commands", "readings", "parameters", "start", "out", "kept")
 """Addresses that the function takes, after the numbers of rows and of steps a row.
 
-times: length of a step before each row, (rows,); commands: [row, step, lane]; readings: [row, sensor, (reading, counts)];
-parameters: [slot, lane]; start: [state and covariance, lane]; out: [row, sensor, (reading less what was expected, variance), lane]; kept: per row
-the predicted mean and covariance, the corrected ones and the transition from the row before, one lane.
+times: length of a step before each row, (rows,); commands: [row, step, lane]; readings: [row,
+    sensor, (reading, counts)]; parameters: [slot, lane]; start: [state and covariance, lane]; out:
+    [row, sensor, (reading less what was expected, variance), lane]; kept: per row the predicted
+    mean and covariance, the corrected ones and the transition from the row before, one lane.
 """
 
 

@@ -8,8 +8,9 @@ from numpy.typing import NDArray
 
 from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
 from pma_gym.discovery.fitting.free_parameters import free_parameters, prior
-from pma_gym.discovery.grey_box.thresholds import FAINT, LIKE, MOST_EFFECTS, ODD, TRIED
+from pma_gym.discovery.grey_box.thresholds import FAINT, LIKE, LOUD, MOST_EFFECTS, ODD, TRIED
 from pma_gym.effects import CATALOGUE
+from pma_gym.effects.effect import signals
 from pma_gym.estimation.innovations import TREND, TRIAL, GreyBox, Point, Rows, log_likelihood
 from pma_gym.estimation.likelihood_fit import (
     STEP,
@@ -27,7 +28,10 @@ from pma_gym.units import Quantity
 Array = NDArray[np.float64]
 
 CAREFUL = ((0.3, 0.5, 1.0), (1.0, 0.2, 10.0), (0.5, 0.5, 0.1))
-"""Further starts of a candidate: share of its size, of the latent force, and times its presliding distance."""
+"""Further starts of a candidate.
+
+Share of its size, of the latent force, and times its presliding distance.
+"""
 
 SUBSTEP_S, ROUGH_SUBSTEP_S = 1e-3, 3e-4
 """Longest integration step, without and with dry friction."""
@@ -36,8 +40,11 @@ MOST_STEPS = 400_000
 """Of all trials together; longer steps where they would take more."""
 
 MOST_ROWS = 12_000
-"""Of all trials together: more are averaged in blocks, as long as the motion bends less in one than its noise;
-of what is more still, every second, third ... block is read."""
+"""Of all trials together.
+
+More are averaged in blocks, as long as the motion bends less in one than its noise; of what is more
+still, every second, third ... block is read.
+"""
 
 BENT = 0.2
 """That bend at most, in standard deviations of a block's noise."""
@@ -46,7 +53,10 @@ STARTS, SMOOTH_STARTS = 8, 3
 """Of the first fit, with and without dry friction, whose likelihood is rugged."""
 
 MOST_TRIALS = 6
-"""With so many trials at most, each is once taken for an odd one: with a large latent force of its own at the start."""
+"""With so many trials at most, each is once taken for an odd one.
+
+With a large latent force of its own at the start.
+"""
 
 ODD_SHARE = 0.005
 """Latent force, as a share of the drive's, from which on that is done."""
@@ -58,16 +68,25 @@ SCATTER = 0.2
 """Standard deviation of a start's parameters, as a share of them."""
 
 SHARES = (0.1, 0.01, 0.03, 0.003)
-"""Latent force at the starts, as a share of the drive's: small, so that it swallows nothing at first."""
+"""Latent force at the starts, as a share of the drive's.
+
+Small, so that it swallows nothing at first.
+"""
 
 WIDE = 5.0
-"""Standard deviation of the own parameters' priors, in those that the parameters' list has (10 % of them)."""
+"""Standard deviation of the own parameters' priors.
+
+In those that the parameters' list has (10 % of them).
+"""
 
 MOST_DELAY = 20.0
 """Longest delay, in rows."""
 
 MOST_FACTOR = 5.0
-"""Factor that a parameter of one trial may differ by: beyond it no cable chain jams, and another thing is missing."""
+"""Factor that a parameter of one trial may differ by.
+
+Beyond it no cable chain jams, and another thing is missing.
+"""
 
 DELAY_ROWS = (0.0, 0.5, 1.0, 2.0, 3.0, 5.0, 8.0, 12.0)
 """Delays (rows) of which a start takes the likeliest."""
@@ -147,7 +166,8 @@ class Search:
         self.channels = [
             i for i in range(len(model.rig.signals)) if any(each.measures[i] for each in logged)
         ]
-        # The delay between command and readings is free in every fit, and a lag of the only sensor is no other thing.
+        # The delay between command and readings is free in every fit; a lag of the only sensor
+        # is no other thing.
         late = DELAYS[:1] if len(self.channels) > 1 else (*DELAYS, *LAGS)
         self.candidates = [each for each in candidates if each.name not in late]
         readings = [
@@ -210,18 +230,19 @@ class Search:
         middle = float(np.median(motor))
         level = float(np.sqrt(np.mean((motor - middle) ** 2))) or 1.0
         (drive,) = [e for e in self.model.effects.values() if e.port == self.model.rig.drive_port]
-        p = self.model.parameters[drive.name]
-        if drive.port == "two_way_drive":
-            return abs(drive.law(middle + level, p) - drive.law(middle, p)) or 1.0
-        names = drive.law.__code__.co_varnames[: drive.law.__code__.co_argcount]
-        at = [{"p": p, "command": c, "spin": 0.0} for c in (middle + level, middle)]
-        return (
-            abs(drive.law(*(at[0][n] for n in names)) - drive.law(*(at[1][n] for n in names)))
-            or 1.0
-        )
+        assert drive.law is not None
+        known = {"p": self.model.parameters[drive.name], "spin": 0.0}
+        forces = []
+        for command in (middle + level, middle):
+            at = {**known, "command": command, "motor_voltage": command}
+            forces.append(drive.law(*(at[name] for name in signals(drive.law))))
+        return abs(forces[0] - forces[1]) or 1.0
 
     def _gains(self) -> list[str]:
-        """Slots of the drive's gain, which one trial cannot tell from the inertia, but several can from each other."""
+        """Slots of the drive's gain, which one trial cannot tell from the inertia.
+
+        But several can from each other.
+        """
         drives = [e for e in self.model.effects.values() if e.port == self.model.rig.drive_port]
         return [
             f"{e.name}.{stem}"
@@ -278,7 +299,7 @@ class Search:
         coordinates = [*own, *self.nuisances()]
         rough, trials = is_rough(self.model), len(self.logged)
         count = STARTS if rough else SMOOTH_STARTS
-        kinds = (False, True) if self.linear is None else (self.linear,)
+        kinds: Sequence[bool] = (False, True) if self.linear is None else (self.linear,)
         fits: dict[bool, list[Fit]] = {linear: [] for linear in kinds}
 
         def start(k: int, odd: int) -> None:
@@ -295,7 +316,7 @@ class Search:
             values = sorted(f.value for f in fits[kinds[0]])
             if len(values) > 2 and values[-1] - values[-3] < ALIKE:
                 break
-        (self.linear,) = kinds
+        self.linear = kinds[0]
         forces = max(fits[self.linear], key=lambda each: each.value).point.forces
         if (
             3 <= trials <= MOST_TRIALS
@@ -315,7 +336,7 @@ class Search:
         k: int,
         odd: int,
     ) -> Point:
-        """Start number k: the first is the model as it came, the last are those with one odd trial."""
+        """Start number k: the first is the model as it came, the last have one odd trial."""
         generator = np.random.default_rng((self.seed, k))
         memory = float(np.sqrt(self.memory[0] * self.memory[1])) if k % 2 else self.memory[0]
         shares = [SHARES[k % 4] if odd < 0 or i != odd else 1.0 for i in range(len(self.logged))]
@@ -461,7 +482,7 @@ class Search:
         """Fit with a move added; `careful` from more starts."""
         candidate = move.candidate
         if candidate is None:
-            return self._varied(now, move)
+            return self._varied(now, move, careful)
         box = self.box(candidate.beside(now.box.model), steps=now.box.rows[0].steps)
         law, tied = CATALOGUE[candidate.effect], dict(now.fit.tied)
         tied |= {f"{candidate.effect}.{tie[1]}": f"{candidate.effect}.{tie[0]}" for tie in law.ties}
@@ -503,16 +524,21 @@ class Search:
         return Hypothesis(box, best, (*now.moves, move), now.rivals)
 
     def _weaker(self, point: Point, share: float) -> Point:
-        """A point with a share of its latent force, in no trial more than thrice the least one, and with no more noise
-        than the readings show: what stood in for an effect makes room for it.
+        """A point with a share of its latent force, in no trial more than thrice the least one.
+
+        And with no more noise than the readings show: what stood in for an effect makes room for
+        it.
         """
         most = 3.0 * min(point.forces) if share < 1.0 else max(point.forces)
         forces = tuple(max(share * min(each, most), 1e-6 * self.force) for each in point.forces)
         noise = tuple(map(min, point.deviations, self.noise))
         return replace(point, forces=forces, deviations=noise)
 
-    def _varied(self, now: Hypothesis, move: Move) -> Hypothesis:
-        """Fit with a parameter that differs by trial, from more starts where the latent force of that trial stands out."""
+    def _varied(self, now: Hypothesis, move: Move, careful: bool) -> Hypothesis:
+        """Fit with a parameter that differs by trial.
+
+        From more starts where the latent force of that trial stands out.
+        """
         (name,) = move.slots
         forces = np.array(now.fit.point.forces)
         odd = name.endswith(f"{TRIAL}{int(np.argmax(forces))}") and forces.max() > ODD * float(
@@ -531,7 +557,8 @@ class Search:
         tied |= {f"{follower}{mark}{number}": name for follower in followers}
         coordinates = [*now.fit.coordinates, Coordinate(name, scale, False, *bounds)]
         best = None
-        further = ((0.5, 0.1), (1.0, 0.1), (-0.3, 0.1)) if odd and mark == TRIAL else ()
+        further = ((0.5, 0.1), (1.0, 0.1), (-0.3, 0.1))[: 3 if careful else 1]
+        further = further if odd and mark == TRIAL else ()
         for amount, share in ((0.0, 0.5), *further):
             there = float(np.clip(first + amount * abs(value), *bounds))
             start = with_values(now.fit.point, with_tied({name: there}, tied))
@@ -541,24 +568,34 @@ class Search:
         return Hypothesis(now.box, best, (*now.moves, move), now.rivals)
 
     def _worth_a_fit(self, now: Hypothesis) -> list[Move]:
-        """The moves that promise half their price; where there is a latent force, the first ones whatever they promise,
-        and each parameter of a trial whose latent force stands out."""
+        """The moves that promise half their price.
+
+        Where there is a latent force, the first ones whatever they promise, and each parameter of a
+        trial whose latent force stands out.
+        """
         moves, forces = self.moves(now), np.array(now.fit.point.forces)
         if not now.moves:
-            # A model that lacks much is bent by its fit: what it lacks is looked for from the model as it came too.
+            # A model that lacks much is bent by its fit: its lack is looked for from the model as
+            # it came too.
             fresh = [
                 replace(move, start=self.unmoved.fit.point)
                 for move in self.moves(self.unmoved)
                 if move.candidate
             ]
-            if max(forces) > FAINT * self.force:
+            if self._is_bent(now):
                 moves = [*moves[:TRIED], *fresh[:TRIED], *moves[TRIED:]]
                 return moves[: 2 * TRIED] + self._odd(now, moves[2 * TRIED :])
         readings = self._readings(now)
         price = 0.5 * (0.5 * np.log(readings) + np.log(len(moves)))
-        if max(forces) < FAINT * self.force:
+        if not self._is_bent(now):
             return [move for move in moves[:TRIED] if move.promise > price]
         return [*moves[:TRIED], *self._odd(now, moves[TRIED:])]
+
+    def _is_bent(self, now: Hypothesis) -> bool:
+        """Whether a latent force, or more noise than the readings show, stands in for something."""
+        point = now.fit.point
+        noisy = [d > LOUD * n for d, n in zip(point.deviations, self.noise, strict=True)]
+        return max(point.forces) > FAINT * self.force or any(noisy)
 
     def _odd(self, now: Hypothesis, moves: Sequence[Move]) -> list[Move]:
         """Each parameter of the trial whose latent force stands out."""
@@ -581,10 +618,10 @@ class Search:
 
     def _refined(self, now: Hypothesis) -> Hypothesis:
         """With the simpler laws of the added effects freed where that is worth its price."""
-        for move in now.moves:
-            law = CATALOGUE[move.candidate.effect] if move.candidate else None
-            for row in (*law.ties, *law.terms) if law else ():
-                larger = self._freed(now, move.candidate, row, tie=row in law.ties)
+        for candidate in [move.candidate for move in now.moves if move.candidate]:
+            law = CATALOGUE[candidate.effect]
+            for row in (*law.ties, *law.terms):
+                larger = self._freed(now, candidate, row, tie=row in law.ties)
                 gain = larger.fit.value - now.fit.value
                 numbers = len(larger.fit.coordinates) - len(now.fit.coordinates)
                 if gain > 0.5 * numbers * np.log(self._readings(now)) + LIKE:
@@ -649,7 +686,10 @@ class Search:
         return replace(now, box=box, fit=max(made, key=lambda each: each.value))
 
     def price(self, one: Hypothesis, other: Hypothesis) -> float:
-        """Log likelihood that a larger hypothesis must gain over a smaller: BIC's, and that of the search."""
+        """Log likelihood that a larger hypothesis must gain over a smaller.
+
+        BIC's, and that of the search.
+        """
         readings = self._readings(one)
         numbers = len(one.fit.coordinates) - len(other.fit.coordinates)
         looked = len(self.candidates) + len(self.logged) * len(self.own()[0])
@@ -678,7 +718,7 @@ class Search:
                 worth[at] = again if again.fit.value > each.fit.value else each
             worth.sort(key=lambda h: self.price(h, now) - h.fit.value)
             if worth:
-                # The smaller hypothesis begins where the larger one ended: neither is ahead by its starts.
+                # The smaller hypothesis begins where the larger one ended: no start is ahead.
                 now = path[-1] = self._again(now, worth[0])
             if not worth or worth[0].fit.value < now.fit.value + self.price(worth[0], now) + LIKE:
                 break
@@ -709,7 +749,7 @@ def reading_step(rows: Sequence[Array]) -> float:
 
 
 def white_noise(rows: Sequence[Array]) -> float:
-    """Standard deviation of white noise by third differences, whose sum of squared weights is 20."""
+    """Standard deviation of white noise by third differences (squared weights sum to 20)."""
     third = np.concatenate([np.diff(row, 3) for row in rows if len(row) > 3])
     robust = 1.4826 * float(np.median(np.abs(third)))
     return max(robust, 0.3 * float(np.std(third)), 1e-12) / 20**0.5

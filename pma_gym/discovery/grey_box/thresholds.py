@@ -1,14 +1,26 @@
-"""The numbers by which the grey box decides, each with its derivation. Numbers of the numerics stand beside them."""
+"""The numbers by which the grey box decides, each with its derivation.
+
+Numbers of the numerics stand beside them.
+"""
 
 MATERIAL = 0.02
-"""Share of the drive's force (root mean square) above which a latent force matters: assumption, what the force constant of a
-drive is known to. A latent force below it is `agrees` or `parameters`, however significant."""
+"""Share of the drive's force (root mean square) above which a latent force matters.
+
+Assumption, what the force constant of a drive is known to. A latent force below it is `agrees` or
+`parameters`, however significant.
+"""
 
 LIKE = 3.0
-"""Difference of log likelihood, after the price, within which two hypotheses are rivals: odds of 20 to 1."""
+"""Difference of log likelihood, after the price, within which two hypotheses are rivals.
+
+Odds of 20 to 1.
+"""
 
 LEFT = 0.5
-"""Share of the latent force (mean square) that effects may leave and still be named: they carry at least half."""
+"""Share of the latent force (mean square) that effects may leave and still be named.
+
+They carry at least half.
+"""
 
 MOST_EFFECTS = 3
 """Effects at most: a beam of more was never right on data whose effects are known (design)."""
@@ -29,13 +41,22 @@ ODD = 3.0
 """Times the median of all trials' latent forces from which on a trial stands out."""
 
 FAINT = 0.002
-"""Share of the drive's force below which a latent force asks for no candidate that promises too little."""
+"""Share of the drive's force below which only promising candidates are fitted."""
 
 ROWS_LATE = 0.05
-"""Rows of the log below which a delay is a matter of how commands are written between rows, not of the rig."""
+"""Rows of the log below which a delay is a matter of how commands are written between rows.
+
+Not of the rig.
+"""
 
 NOISES = 3.0
-"""Noises that predictions may miss by where the model is said to be right, as the campaign on hidden effects counts it."""
+"""Noises that predictions may miss by where the model is said to be right.
+
+As the campaign on hidden effects counts it.
+"""
 
 SURE = 3.0
-"""Standard errors that a size must be from none for its effect to be named: a chance of 1 in 400."""
+"""Standard errors from none that a size must be for its effect to be named: 1 in 400."""
+
+LOUD = 2.0
+"""Times the noise that readings show by their third differences that a fitted noise may have."""

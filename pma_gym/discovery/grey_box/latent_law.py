@@ -1,0 +1,60 @@
+"""What the smoothed latent force goes with, and in which trials it acts."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from pma_gym.data.trial_columns import BY_QUANTITY
+from pma_gym.discovery.grey_box.thresholds import CONFIDENCE
+from pma_gym.discovery.report.figure_text import percent, signal_name
+from pma_gym.discovery.result.misfit import Place, ResidualLaw
+from pma_gym.estimation.smoother import Smoothed
+from pma_gym.plant.rigs.rig import Rig
+from pma_gym.units import SI_FACTORS
+
+BINS, FEWEST = 12, 3
+"""Of a law that is drawn from the smoothed force, and the fewest that make one."""
+
+INDEPENDENT = 20.0
+"""Rows that count as one independent value of a smoothed force."""
+
+
+def latent_law(trials: Sequence[Smoothed], rig: Rig) -> ResidualLaw | None:
+    """The law, in bins of the position or the speed, whichever explains more of the force."""
+    force = np.concatenate([each.force for each in trials])
+    columns = [BY_QUANTITY[signal.name] for signal in rig.signals[:2]]
+    values = [[each.position for each in trials], [each.speed for each in trials]]
+    best = None
+    for column, parts in zip(columns, values, strict=True):
+        x = np.concatenate(parts)
+        edges = np.unique(np.quantile(x, np.linspace(0.0, 1.0, BINS + 1)))
+        bins = len(edges) - 1
+        if bins < FEWEST:
+            continue
+        of = np.clip(np.searchsorted(edges, x, side="right") - 1, 0, bins - 1)
+        count = np.maximum(np.bincount(of, minlength=bins), 1)
+        mean = np.bincount(of, force, bins) / count
+        off = (force - mean[of]) ** 2
+        explained = 1.0 - float(np.mean(off)) / max(float(np.mean(force**2)), 1e-300)
+        spread = np.sqrt(np.bincount(of, off, bins) / count / np.maximum(count / INDEPENDENT, 1.0))
+        at = 0.5 * (edges[:-1] + edges[1:]) / SI_FACTORS[column.unit]
+        if best is None or explained > best[0]:
+            best = explained, column, at, mean, CONFIDENCE * spread
+    if best is None:
+        return None
+    explained, column, at, mean, wide = best
+    what = "torque on the joint (N m)" if rig.name == "joint" else "force on the slide (N)"
+    name, share = signal_name(column.name), percent(max(explained, 0.0))
+    words = f"goes with {name}: that explains {share} of its mean square"
+    return ResidualLaw(what, f"{name} ({column.unit})", at, mean, mean - wide, mean + wide, words)
+
+
+def shares_by_trial(
+    trials: Sequence[Smoothed], names: Sequence[str], column: str
+) -> tuple[Place, ...]:
+    """Shares of the latent force (mean square) of the trials that have most of it."""
+    squares = np.array([float(np.sum(each.force**2)) for each in trials])
+    shares = squares / max(float(squares.sum()), 1e-300)
+    return tuple(
+        Place(column, f"trial {names[i]}", float(shares[i]), 0.0) for i in np.argsort(-shares)[:3]
+    )
