@@ -36,10 +36,10 @@ Share of its size, of the latent force, and times its presliding distance.
 SUBSTEP_S, ROUGH_SUBSTEP_S = 1e-3, 3e-4
 """Longest integration step, without and with dry friction."""
 
-MOST_STEPS = 400_000
+MOST_STEPS = 150_000
 """Of all trials together; longer steps where they would take more."""
 
-MOST_ROWS = 12_000
+MOST_ROWS = 8_000
 """Of all trials together.
 
 More are averaged in blocks, as long as the motion bends less in one than its noise; of what is more
