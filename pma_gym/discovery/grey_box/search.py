@@ -27,6 +27,9 @@ from pma_gym.units import Quantity
 
 Array = NDArray[np.float64]
 
+WIDER = (1.0, 0.2, 5.0)
+"""Times the usual shape (a Stribeck speed) from which the fuller law of an effect is fitted."""
+
 CAREFUL = ((0.3, 0.5, 1.0), (1.0, 0.2, 10.0), (0.5, 0.5, 0.1))
 """Further starts of a candidate.
 
@@ -646,9 +649,13 @@ class Search:
                 more.append(Coordinate(name, abs(values[name]) or 1.0, False, low, high))
         if not more:
             return now
-        start = with_values(point, with_tied(values, tied))
-        made = fit(now.box, start, [*now.fit.coordinates, *more], tied)
-        return replace(now, fit=made)
+        best = now.fit
+        for wide in WIDER:
+            shaped = {n: v * (1.0 if n in now.fit.tied else wide) for n, v in values.items()}
+            start = with_values(point, with_tied(shaped, tied))
+            made = fit(now.box, self._weaker(start, 0.3), [*now.fit.coordinates, *more], tied)
+            best = made if made.value > best.value else best
+        return replace(now, fit=best)
 
     @staticmethod
     def _readings(each: Hypothesis) -> int:
@@ -726,8 +733,7 @@ class Search:
             near = [h.moves[-1].name for h in worth[1:] if h.fit.value - self.price(h, now) > least]
             rivals = tuple(name for name in dict.fromkeys(near) if name != worth[0].moves[-1].name)
             best = self._other_hold(worth[0]) if free else worth[0]
-            path.append(replace(best, rivals=(*now.rivals, rivals)))
-        path[-1] = self._refined(path[-1]) if path[-1].moves else path[-1]
+            path.append(self._refined(replace(best, rivals=(*now.rivals, rivals))))
         return path
 
 
