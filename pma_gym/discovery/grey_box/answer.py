@@ -404,7 +404,7 @@ class Found:
 
     @cached_property
     def law(self) -> ResidualLaw | None:
-        """What the latent force goes with most: speed, position or command, in bins."""
+        """What the latent force goes with most: speed or position, in bins."""
         rig = self.search.model.rig
         position, speed = (BY_QUANTITY[s.name] for s in rig.signals[:2])
         force = np.concatenate([each.force for each in self.smooth])

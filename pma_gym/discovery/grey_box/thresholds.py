@@ -8,7 +8,8 @@ LIKE = 3.0
 """Difference of log likelihood, after the price, within which two hypotheses are rivals: odds of 20 to 1."""
 
 LEFT = 0.5
-"""Share of the latent force (mean square) that effects may leave and still be named: they carry at least half."""
+"""Share of the predictions' misfit beyond noise (mean square) that effects may leave and still be
+named: they carry at least half."""
 
 MOST_EFFECTS = 3
 """Effects at most: a beam of more was never right on data whose effects are known (design)."""
