@@ -46,9 +46,11 @@ class Diagnosis:
         effects: what is missing; empty unless the verdict is `effect`.
         parameters: the model's own parameters that moved, by path; where nothing but parameters is
             off, only those that are named.
-        gap: by column name, over all trials.
+        gap: by column name, over all trials; of slides and joints that of predictions a
+            short time ahead.
         candidates: the whole catalogue, the likeliest first.
-        next_experiment: what to measure next, where that would tell more.
+        next_experiment: what to measure next, where that would tell more; None for slides and
+            joints.
         model: the amended model.
         given: the model as it was given.
         not_identifiable: paths of parameters that these data do not determine, with the reason.

@@ -1,4 +1,4 @@
-"""The diagnosis from trials to answer, step by step; each step is a module of its own."""
+"""The diagnosis from trials to answer: slides and joints by one likelihood, others step by step."""
 
 import time
 from collections.abc import Callable, Sequence
@@ -73,11 +73,12 @@ def diagnose(
         trials: measured trials, or a data set (`pma_gym.data.datasets.dataset.read_dataset`).
         model: the model to compare with; what the data set names, else station.
         seed: of simulated chance.
-        jobs: how many threads simulate.
+        jobs: how many threads simulate; slides and joints take one.
         journal: a folder in which finished fits are kept, from which an interrupted diagnosis goes
-            on; None keeps nothing.
+            on; None keeps nothing. Slides and joints keep none.
         progress: called with a step's name, what is done of it and its total.
-        propose: whether to look for the next experiment too, which takes seconds.
+        propose: whether to look for the next experiment too, which takes seconds; slides and joints
+            have none.
         checks: whether a column of a data set that is certainly in another unit is refused; else it
             is only said.
     Returns:
@@ -115,7 +116,8 @@ def refit(
 
     Arguments and errors as `diagnose`. The verdict is `parameters` or `agrees` where the residual
     of readings left out is noise, `unknown` where parameters alone do not explain the readings, and
-    `undecidable` where the trials do not decide.
+    `undecidable` where the trials do not decide. It is `effect` where the command of a
+    slide or joint is late.
     """
     with linear_algebra_alone():
         return _Work(trials, model, seed, jobs, journal, progress, checks=checks).run(search=False)

@@ -17,7 +17,7 @@ Odds of 20 to 1.
 """
 
 LEFT = 0.5
-"""Share of the latent force (mean square) that effects may leave and still be named.
+"""Share of the predictions' misfit beyond noise (mean square) that named effects may leave.
 
 They carry at least half.
 """
