@@ -1,5 +1,7 @@
 """A slide without dry friction, by the exact matrix exponential: no line of the package's filter is in it."""
 
+from functools import cache
+
 import numpy as np
 from scipy.linalg import expm
 
@@ -32,6 +34,7 @@ def slide(mass=MASS_KG, bandwidth=BANDWIDTH_HZ, speed=False, **tables):
     return Model("slide", "A slide", "slide", {n: CATALOGUE[n].parse(t) for n, t in known.items()})
 
 
+@cache
 def matrices(force, memory, span):
     """Transition, input and process covariance over a time; states: position, speed, force, two lags."""
     lag = 2.0 * np.pi * BANDWIDTH_HZ
