@@ -93,7 +93,10 @@ def begun(trial, channels, force):
     y = trial.measurements["contraction"]
     there = np.flatnonzero(np.isfinite(y))[:8]
     first, t = y[there[0]], trial.time[there]
-    speed, spread = np.polyfit(t - t[0], y[there], 1)[0], (np.ptp(y[there]) + 1e-12) / (t[-1] - t[0])
+    speed, spread = (
+        np.polyfit(t - t[0], y[there], 1)[0],
+        (np.ptp(y[there]) + 1e-12) / (t[-1] - t[0]),
+    )
     if 1 in channels:
         v = trial.measurements["velocity"]
         v = v[np.isfinite(v)][:8]

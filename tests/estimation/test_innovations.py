@@ -43,7 +43,9 @@ def test_without_a_latent_force_halved_steps_leave_a_quarter_of_the_error():
     assert all(3.0 < c / f < 5.0 for c, f in zip(coarse, fine, strict=True))
 
 
-@pytest.mark.xfail(strict=True, reason="process noise enters after a step: variances are of order 1")
+@pytest.mark.xfail(
+    strict=True, reason="process noise enters after a step: variances are of order 1"
+)
 def test_with_a_latent_force_halved_steps_leave_a_quarter_of_the_error():
     trial, _ = logged(force=2.0)
     coarse, fine = (errors_of(trial, (0, 1), steps, 2.0) for steps in (8, 16))
@@ -141,7 +143,9 @@ def test_predictions_of_a_perfect_model_miss_by_noise_alone():
     trials = [logged(seed, force=0.0)[0] for seed in range(3)]
     made = box(trials, slide())
     curves = predictions(made, point(made, NO_FORCE), 0.25)
-    off = [c[25:, 0] - t.measurements["contraction"][25:] for c, t in zip(curves, trials, strict=True)]
+    off = [
+        c[25:, 0] - t.measurements["contraction"][25:] for c, t in zip(curves, trials, strict=True)
+    ]
     assert 0.9 < np.std(np.concatenate(off)) / NOISES[0] < 1.25
 
 
@@ -151,7 +155,8 @@ def test_predictions_of_a_window_do_not_know_its_readings():
     moved = trial.measurements["contraction"] + 1e-3 * (window == 2)
     other = Trial(trial.time, trial.commands, {"contraction": moved})
     (before,), (after,) = (
-        predictions(made, point(made), 0.25) for made in (box([trial], slide()), box([other], slide()))
+        predictions(made, point(made), 0.25)
+        for made in (box([trial], slide()), box([other], slide()))
     )
     off = np.abs(after - before)[:, 0]
     assert off[window % 2 == 0].max() < 1e-12 and off[window == 3].max() > 1e-4

@@ -32,7 +32,9 @@ def test_what_the_plant_was_simulated_with_is_found_from_afar():
     model, time = slide(coulomb_friction=dry), np.arange(0.0, 4.0, 0.01)
     generator, trials = np.random.default_rng(2), []
     for hertz in (0.7, 1.1):
-        asked = Trial(time, {"load_command": 40.0 * np.sin(2 * np.pi * hertz * time) * (time > 0.1)})
+        asked = Trial(
+            time, {"load_command": 40.0 * np.sin(2 * np.pi * hertz * time) * (time > 0.1)}
+        )
         exact = Plant(model).simulate(asked, noise=False).measurements["contraction"]
         noisy = exact + NOISES[0] * generator.standard_normal(time.size)
         trials.append(Trial(time, asked.commands, {"contraction": noisy}))
