@@ -1,4 +1,4 @@
-"""A slide without dry friction, by the exact matrix exponential: no line of the package's filter is in it."""
+"""A slide without dry friction, by the matrix exponential: the package's filter is not in it."""
 
 from functools import cache
 
@@ -36,7 +36,7 @@ def slide(mass=MASS_KG, bandwidth=BANDWIDTH_HZ, speed=False, **tables):
 
 @cache
 def matrices(force, memory, span):
-    """Transition, input and process covariance over a time; states: position, speed, force, two lags."""
+    """Transition, input, process covariance over a time; of position, speed, force, two lags."""
     lag = 2.0 * np.pi * BANDWIDTH_HZ
     a = np.zeros((6, 6))
     a[0, 1] = 1.0

@@ -1,4 +1,4 @@
-"""The filter of a free rig against an independent one with the exact matrix exponential, and against `Plant`."""
+"""The filter of a free rig against one with the matrix exponential, and against `Plant`."""
 
 from dataclasses import replace
 
@@ -17,7 +17,7 @@ NO_FORCE = 1e-9
 
 
 def errors_of(trial, channels, steps, force):
-    """How far innovations (noises), variances (shares) and log likelihood are from the exact filter's."""
+    """How far innovations, variances and log likelihood are from the exact filter's, in shares."""
     made = box([trial], slide(speed=1 in channels), channels, steps)
     ((errors, spreads),) = made.innovations([point(made, force)])
     e, s, total = kalman(trial, channels, force)

@@ -1,4 +1,4 @@
-"""The fit of a filter's likelihood: it finds what simulated data were made of, and says how sure it is."""
+"""The greatest likelihood is where simulated data came from, as surely as it says."""
 
 from dataclasses import replace
 

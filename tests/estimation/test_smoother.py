@@ -10,7 +10,7 @@ from tests.estimation.linear_slide import NOISES, begun, box, logged, matrices, 
 
 
 def exact(trial, made):
-    """Transition, drift and process covariance from each row to the next, by the matrix exponential."""
+    """Transition, drift and covariance from each row to the next, by the matrix exponential."""
     load = trial.commands["load_command"]
     for k, span in enumerate(np.diff(trial.time)):
         phi, gamma, q = matrices(2.0, 0.1, span)
@@ -27,7 +27,7 @@ def integrated(trial, made):
 
 
 def conditioned(trial, ways):
-    """Latent force and its deviation at all rows: a Gaussian of all states at once, given all readings."""
+    """Latent force and its deviation at all rows: one Gaussian of all states, after all readings."""
     count = len(trial.time)
     middle, across = np.zeros((count, 4)), np.zeros((count, 4, count, 4))
     mean, start = begun(trial, (0,), 2.0)

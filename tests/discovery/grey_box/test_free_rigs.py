@@ -1,4 +1,4 @@
-"""Diagnoses of slides and joints that a simulator of its own made: what is wrong with them is known."""
+"""Diagnoses of slides and joints of another simulator: what is wrong with them is known."""
 
 import re
 from functools import cache
@@ -23,10 +23,10 @@ RIGS = {
 
 
 def logs(plant, seconds=4.0, begin=0.0, friction=(1.0, 1.0, 1.0), gain=(1.0, 1.0, 1.0), seed=1):
-    """Three trials of a rig that a controller moves along sums of sines, from where it has got to at a time.
+    """Three trials of a rig that a controller moves along sums of sines, from a time on.
 
-    Friction and gain of each trial are in shares of the rig's own. Friction is an impulse that takes
-    as much of the momentum as there is at most.
+    Friction and gain of each trial are in shares of the rig's own. Friction is an impulse that at
+    most stops the rig.
     """
     inertia, damping, dry, (stiffness, rate_gain), size, noise, command, reading = RIGS[plant]
     generator, trials, step = np.random.default_rng(seed), [], 1.0 / RATE_HZ / SUBSTEPS
@@ -102,7 +102,7 @@ DRY = {"slide": "coulomb_friction", "joint": "joint_friction"}
 SIZE = {"slide": "dynamic_n", "joint": "dynamic_n_m"}
 INERTIA = {"slide": "slide.mass_kg", "joint": "inertia.inertia_kg_m2"}
 NEAR = {"slide": 10.0, "joint": 0.1}
-"""A presliding distance, in its file unit, that is none of the simulator's, whose friction sticks at once."""
+"""Presliding distance, in its file unit; the simulator's friction has none."""
 
 HELD = "the fit of held commands ends below that of lines half a row later, which it calls a delay"
 
