@@ -27,7 +27,7 @@ def integrated(trial, made):
 
 
 def conditioned(trial, ways):
-    """Latent force and its deviation at all rows: one Gaussian of all states, after all readings."""
+    """Latent force and its deviation at all rows: one Gaussian of states after all readings."""
     count = len(trial.time)
     middle, across = np.zeros((count, 4)), np.zeros((count, 4, count, 4))
     mean, start = begun(trial, (0,), 2.0)
