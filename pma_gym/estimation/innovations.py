@@ -190,7 +190,7 @@ class Rows:
         edges = self.time[:-1, None] + spans[:, None] * (np.arange(steps + 1) / steps)
         self._from, self._to = edges[:, :-1], edges[:, 1:]
         self._known: dict[float, Array] = {}
-        self._begun: dict[tuple[int | None, int | None], tuple[float, float, float]] = {}
+        self._starts: dict[tuple[int | None, int | None], tuple[float, float, float]] = {}
 
     @property
     def first(self) -> float:
@@ -218,9 +218,9 @@ class Rows:
 
     def begin(self, position: int | None, speed: int | None) -> tuple[float, float, float]:
         """First position and speed, with the speed's standard deviation, from the first rows."""
-        if (position, speed) not in self._begun:
-            self._begun[position, speed] = self._first(position, speed)
-        return self._begun[position, speed]
+        if (position, speed) not in self._starts:
+            self._starts[position, speed] = self._first(position, speed)
+        return self._starts[position, speed]
 
     def _first(self, position: int | None, speed: int | None) -> tuple[float, float, float]:
         first, motion, spread = 0.0, 0.0, 0.0

@@ -8,8 +8,8 @@ from pma_gym.data.datasets.dataset import NamedTrial
 from pma_gym.data.trial_columns import BY_QUANTITY
 from pma_gym.discovery.diagnosis import Diagnosis
 from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
-from pma_gym.discovery.grey_box.found import Found
-from pma_gym.discovery.grey_box.search import Search
+from pma_gym.discovery.grey_box.conclusions import Conclusions
+from pma_gym.discovery.grey_box.effect_selection import EffectSelection
 from pma_gym.discovery.grey_box.sentence import sentence
 from pma_gym.discovery.grey_box.thresholds import (
     MATERIAL,
@@ -23,16 +23,16 @@ from pma_gym.plant.model import Model
 from pma_gym.units import SI_FACTORS
 
 
-def diagnosis(found: Found) -> Diagnosis:
-    """The answer with its evidence."""
-    base, last = found.path[0], found.last
-    named = found.verdict == "effect"
+def diagnosis(conclusions: Conclusions) -> Diagnosis:
+    """The answer with its conclusions."""
+    base, last = conclusions.path[0], conclusions.last
+    named = conclusions.verdict == "effect"
     floors = {}
     for i, channel in enumerate(base.box.channels):
-        column = BY_QUANTITY[found.search.model.rig.signals[channel].name]
+        column = BY_QUANTITY[conclusions.selection.model.rig.signals[channel].name]
         value, step = (
             v / SI_FACTORS[column.unit]
-            for v in (base.fit.point.deviations[i], found.search.steps_of_readings[i])
+            for v in (base.fit.point.deviations[i], conclusions.selection.steps_of_readings[i])
         )
         floors[column.name] = Floor(value, "innovations", {"innovations": value}, step, ())
     chosen = {move.name for move in last.moves}
@@ -47,28 +47,28 @@ def diagnosis(found: Found) -> Diagnosis:
             True,
             ADDED if name in chosen else "explains less than its price",
         )
-        for name, gain in sorted(found.search.gains.items(), key=lambda pair: -pair[1])
+        for name, gain in sorted(conclusions.selection.gains.items(), key=lambda pair: -pair[1])
         if TREND not in name and TRIAL not in name
     ]
-    approximate = found.share(last) > MATERIAL and bool(found.effects)
+    approximate = conclusions.share(last) > MATERIAL and bool(conclusions.effects)
     return Diagnosis(
-        verdict=found.verdict,
-        sentence=sentence(found),
-        where=found.where if last.moves or found.verdict == "unknown" else (),
-        effects=found.effects if named else (),
-        parameters=found.parameters,
-        gap=found.gap,
+        verdict=conclusions.verdict,
+        sentence=sentence(conclusions),
+        where=conclusions.where if last.moves or conclusions.verdict == "unknown" else (),
+        effects=conclusions.effects if named else (),
+        parameters=conclusions.parameters,
+        gap=conclusions.gap,
         candidates=tuple(candidates),
         next_experiment=None,
-        model=found.model,
-        given=found.search.model,
-        approximate=Approximate(found.effects, found.left, found.holds_out(last))
+        model=conclusions.model,
+        given=conclusions.selection.model,
+        approximate=Approximate(conclusions.effects, conclusions.left, conclusions.holds_out(last))
         if approximate
         else None,
-        law=found.law if found.verdict == "unknown" or approximate else None,
+        law=conclusions.law if conclusions.verdict == "unknown" or approximate else None,
         floors=floors,
-        states=found.states,
-        trials=found.records,
+        states=conclusions.states,
+        trials=conclusions.records,
         steps=(),
     )
 
@@ -94,11 +94,11 @@ def answered(
         TrialError: trials with fewer readings than a fit needs.
     """
     logged = [Logged.of(model, i, each.trial) for i, each in enumerate(named)]
-    search = Search(model, logged, candidates or (), seed=seed, tell=tell)
-    path = [search.base()] if candidates is None else search.run()
+    selection = EffectSelection(model, logged, candidates or (), seed=seed, tell=tell)
+    path = [selection.base()] if candidates is None else selection.run()
     tell("putting the answer together", 0, 1)
     limits = {
         BY_QUANTITY[name].name: value / SI_FACTORS[BY_QUANTITY[name].unit]
         for name, value in tolerance.items()
     }
-    return diagnosis(Found(search, path, named, limits, candidates or ()))
+    return diagnosis(Conclusions(selection, path, named, limits, candidates or ()))

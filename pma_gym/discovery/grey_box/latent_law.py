@@ -12,7 +12,7 @@ from pma_gym.estimation.smoother import Smoothed
 from pma_gym.plant.rigs.rig import Rig
 from pma_gym.units import SI_FACTORS
 
-BINS, FEWEST = 12, 3
+BINS, LEAST_BINS = 12, 3
 """Of a law that is drawn from the smoothed force, and the fewest that make one."""
 
 INDEPENDENT = 20.0
@@ -29,7 +29,7 @@ def latent_law(trials: Sequence[Smoothed], rig: Rig) -> ResidualLaw | None:
         x = np.concatenate(parts)
         edges = np.unique(np.quantile(x, np.linspace(0.0, 1.0, BINS + 1)))
         bins = len(edges) - 1
-        if bins < FEWEST:
+        if bins < LEAST_BINS:
             continue
         of = np.clip(np.searchsorted(edges, x, side="right") - 1, 0, bins - 1)
         count = np.maximum(np.bincount(of, minlength=bins), 1)

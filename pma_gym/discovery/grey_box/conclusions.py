@@ -1,4 +1,4 @@
-"""What a search found, and what follows from it.
+"""What a selection of effects leads to, and what follows from it.
 
 Verdict, sizes with intervals, gaps of predictions, the amended model.
 """
@@ -15,8 +15,8 @@ from pma_gym.data.trial_columns import BY_QUANTITY
 from pma_gym.discovery.answer.trial_records import gaps
 from pma_gym.discovery.diagnosis import Verdict
 from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
+from pma_gym.discovery.grey_box.effect_selection import EffectSelection, Hypothesis, Move, slot
 from pma_gym.discovery.grey_box.latent_law import latent_law, shares_by_trial
-from pma_gym.discovery.grey_box.search import Hypothesis, Move, Search, slot
 from pma_gym.discovery.grey_box.thresholds import (
     CONFIDENCE,
     HORIZON,
@@ -44,18 +44,18 @@ FOLDS = 3
 
 
 @dataclass(frozen=True)
-class Found:
-    """All that a search found, and what follows from it.
+class Conclusions:
+    """All that follows from a selection of effects.
 
     Attributes:
-        search: the search.
+        selection: of effects.
         path: its hypotheses, the model as it came first.
         named: the trials.
         tolerance: what the lab tolerates, by column in its unit.
         candidates: the whole catalogue.
     """
 
-    search: Search
+    selection: EffectSelection
     path: Sequence[Hypothesis]
     named: Sequence[NamedTrial]
     tolerance: Mapping[str, float]
@@ -64,7 +64,7 @@ class Found:
     @cached_property
     def horizon(self) -> float:
         """How far ahead is predicted (s)."""
-        shortest = min(float(each.time[-1] - each.time[0]) for each in self.search.logged)
+        shortest = min(float(each.time[-1] - each.time[0]) for each in self.selection.logged)
         return min(HORIZON_S, HORIZON * shortest)
 
     @cached_property
@@ -123,7 +123,7 @@ class Found:
     def misfit(self, each: Hypothesis) -> float:
         """Root mean square of what predictions miss, in noises."""
         parts = [
-            ((curve - trial.readings[:, :, 0]) / self.search.noise)[trial.there]
+            ((curve - trial.readings[:, :, 0]) / self.selection.noise)[trial.there]
             for curve, trial in zip(self.curves(each), each.box.rows, strict=True)
         ]
         return float(np.sqrt(np.mean(np.concatenate(parts) ** 2)))
@@ -148,7 +148,9 @@ class Found:
         """
         ratio = each.fit.point.memory / self.horizon
         mean = 2.0 * ratio * (1.0 - ratio * (1.0 - np.exp(-1.0 / ratio)))
-        return float(np.sqrt(np.mean(np.square(each.fit.point.forces)) * mean)) / self.search.force
+        return (
+            float(np.sqrt(np.mean(np.square(each.fit.point.forces)) * mean)) / self.selection.force
+        )
 
     @cached_property
     def left(self) -> float:
@@ -163,9 +165,11 @@ class Found:
         """Whether a latent force is worth its price beside the proposed hypothesis."""
         last = self.last
         without = [c for c in last.fit.coordinates if not c.name.startswith("force ")]
-        none = replace(last.fit.point, forces=(1e-6 * self.search.force,) * len(self.named))
+        none = replace(last.fit.point, forces=(1e-6 * self.selection.force,) * len(self.named))
         made = fit(last.box, none, without, last.fit.tied)
-        return last.fit.value - made.value > self.search.price(last, replace(last, fit=made)) + LIKE
+        return (
+            last.fit.value - made.value > self.selection.price(last, replace(last, fit=made)) + LIKE
+        )
 
     @cached_property
     def delayed(self) -> bool:
@@ -175,13 +179,13 @@ class Found:
             return False
         late, error = last.fit.point.delay, last.fit.deviations["delay"]
         if late < max(
-            ROWS_LATE * self.search.span / self.search.stride / self.search.block,
+            ROWS_LATE * self.selection.span / self.selection.stride / self.selection.block,
             CONFIDENCE * error,
         ):
             return False
         prompt = [c for c in last.fit.coordinates if c.name != "delay"]
         made = fit(last.box, replace(last.fit.point, delay=0.0), prompt, last.fit.tied)
-        price = self.search.price(last, replace(last, fit=made)) + np.log(len(self.candidates))
+        price = self.selection.price(last, replace(last, fit=made)) + np.log(len(self.candidates))
         return last.fit.value - made.value > price + LIKE
 
     @cached_property
@@ -237,14 +241,16 @@ class Found:
             {c.name: own[c.name] for c in base.fit.coordinates if c.name in own}, base.fit.tied
         )
         made = fit(base.box, with_values(base.fit.point, values), free, base.fit.tied)
-        return base.fit.value - made.value > self.search.price(base, replace(base, fit=made)) + LIKE
+        return (
+            base.fit.value - made.value > self.selection.price(base, replace(base, fit=made)) + LIKE
+        )
 
     @cached_property
     def records(self) -> tuple[TrialRecord, ...]:
         """Curves and gaps of every trial."""
         last, base = self.last, self.path[0]
         records = []
-        signals = self.search.model.rig.signals
+        signals = self.selection.model.rig.signals
         curves = zip(
             self.named, last.box.rows, self.given, self.curves(base), self.curves(last), strict=True
         )
@@ -289,7 +295,7 @@ class Found:
     def model(self) -> Model:
         """The amended model."""
         if self.verdict == "agrees":
-            return self.search.model
+            return self.selection.model
         last = (
             self.last
             if self.verdict == "effect"
@@ -379,14 +385,14 @@ class Found:
         A lag, and with one signal that of its sensor.
         """
         channels = self.last.box.channels
-        sensors = [self.search.model.rig.signals[channel].sensor for channel in channels]
+        sensors = [self.selection.model.rig.signals[channel].sensor for channel in channels]
         late = [f"{sensor}_{kind}" for sensor in sensors for kind in ("delay", "lag")]
         names = [each.name for each in self.candidates]
         return tuple(n for n in names if n == "drive_lag" or len(channels) == 1 and n in late)
 
     def _chance(self, move: Move) -> float:
         """Bound of the chance of such a gain over all that was looked for."""
-        gain = self.search.gains.get(move.name, 0.0)
+        gain = self.selection.gains.get(move.name, 0.0)
         return float(min(1.0, len(self.candidates) * np.exp(-min(gain, 600.0))))
 
     @cached_property
@@ -410,12 +416,12 @@ class Found:
     @cached_property
     def law(self) -> ResidualLaw | None:
         """What the latent force goes with."""
-        return latent_law(self.smooth, self.search.model.rig)
+        return latent_law(self.smooth, self.selection.model.rig)
 
     @cached_property
     def where(self) -> tuple[Place, ...]:
         """Shares of the latent force by trial."""
-        signal = self.search.model.rig.signals[self.last.box.channels[0]]
+        signal = self.selection.model.rig.signals[self.last.box.channels[0]]
         names = [each.name for each in self.named]
         return shares_by_trial(self.smooth, names, BY_QUANTITY[signal.name].name)
 
@@ -423,7 +429,7 @@ class Found:
     def states(self) -> dict[str, TrialState]:
         """What belongs to each trial: its start, and its own values."""
         out = {}
-        position, speed = self.search.model.rig.start_paths.items()
+        position, speed = self.selection.model.rig.start_paths.items()
         for i, (each, smooth) in enumerate(zip(self.named, self._ended, strict=True)):
             values = {}
             for (_, path), value in zip(

@@ -65,7 +65,7 @@ ODD_SHARE = 0.005
 """Latent force, as a share of the drive's, from which on that is done."""
 
 ALIKE = 0.5
-"""Log likelihood within which three starts have found the same."""
+"""Log likelihood within which three starts agree."""
 
 SCATTER = 0.2
 """Standard deviation of a start's parameters, as a share of them."""
@@ -143,8 +143,8 @@ class Hypothesis:
     rivals: tuple[tuple[str, ...], ...] = ()
 
 
-class Search:
-    """A search for what a model lacks.
+class EffectSelection:
+    """A selection of what a model lacks.
 
     Args:
         model: the model as it came.
@@ -556,8 +556,8 @@ class Search:
         alone = max(old.lower, ends[0]), min(old.upper, ends[1])
         first, bounds = (0.0, (-np.inf, np.inf)) if mark == TREND else (value, alone)
         tied = dict(now.fit.tied)
-        followers = [slot_ for slot_, of in now.fit.tied.items() if of == base]
-        tied |= {f"{follower}{mark}{number}": name for follower in followers}
+        tied_slots = [slot_ for slot_, of in now.fit.tied.items() if of == base]
+        tied |= {f"{tied_slot}{mark}{number}": name for tied_slot in tied_slots}
         coordinates = [*now.fit.coordinates, Coordinate(name, scale, False, *bounds)]
         best = None
         further = ((0.5, 0.1), (1.0, 0.1), (-0.3, 0.1))[: 3 if careful else 1]
@@ -576,7 +576,7 @@ class Search:
         Where there is a latent force, the first ones whatever they promise, and each parameter of a
         trial whose latent force stands out.
         """
-        moves, forces = self.moves(now), np.array(now.fit.point.forces)
+        moves = self.moves(now)
         if not now.moves:
             # A model that lacks much is bent by its fit: its lack is looked for from the model as
             # it came too.
