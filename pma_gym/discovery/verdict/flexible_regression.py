@@ -65,12 +65,6 @@ class Explained:
         return float(np.quantile(means, 1.0 - chance))
 
 
-def _moving(logged: Logged, simulated: Array) -> list[Array]:
-    """The position and the pressure of a rig, as far as it has them."""
-    channels = (logged.channel("displacement", "angle"), logged.channel("pressure"))
-    return [simulated[channel] for channel in channels if channel is not None]
-
-
 def variables(logged: Logged, simulated: Array) -> Array:
     """State, command and its history in each row of a trial, shape (rows, variables).
 
@@ -79,7 +73,8 @@ def variables(logged: Logged, simulated: Array) -> Array:
         simulated: what the model's sensors hold (SI), shape (signals, rows).
     """
     time = logged.time
-    columns = [*simulated, *(np.gradient(row, time) for row in _moving(logged, simulated))]
+    moving = (logged.row(simulated, each) for each in ("displacement", "pressure"))
+    columns = [*simulated, *(np.gradient(row, time) for row in moving)]
     for command in (logged.motor, logged.regulator):
         columns += [command, np.maximum.accumulate(command), np.minimum.accumulate(command)]
         columns += [command - _smoothed(command, time, memory) for memory in MEMORIES_S]
