@@ -41,8 +41,7 @@ def reestimated_noise(
         learnt = autoregression(known, before.level) if known else before
         if known and learnt.level > STRUCTURE * before.level:
             learnt = replace(learnt, coefficients=(), innovation=learnt.level)
-        nuisances = {"drift": before.drift, "waves": before.waves, "offset": before.offset}
-        filters.append(replace(learnt, lines=before.lines, **nuisances))
+        filters.append(replace(learnt, lines=before.lines, drift=before.drift, waves=before.waves))
     return tuple(filters)
 
 
