@@ -2,8 +2,8 @@
 
 What repeats with the command is structure; only what does not repeat may be noise. Two trials with
 the same times and commands differ by their noise alone, less what follows the state or the command
-(a rig that warms up between them): that is taken out first. Without repeats, long rest segments tell
-the colour, and nothing tells a drift.
+(a rig that warms up between them): that is taken out first. Without repeats, long rest segments
+tell the colour, and nothing tells a drift.
 """
 
 import math
