@@ -4,7 +4,6 @@ A rig says which of them it has. All that code asks of a signal stands here, so 
 its name, and a new one is a row of this table.
 """
 
-import math
 from dataclasses import dataclass
 from typing import Literal
 
@@ -44,9 +43,6 @@ class Signal:
         shortens: it grows where the muscle shortens, so it counts against a pull.
         lengthens: it grows where the muscle is pulled out.
         called: what people call it, where that is not its name.
-        forwards, backwards: what a rig does while it grows, and while it falls.
-        slowest: smallest rate that counts as motion (SI per s), at most; infinite where only its
-            trials say.
         least_span: smallest range in which a slope shows (SI).
         least_rate: smallest rate that counts as motion where a trial begins (SI per s).
         stems: names that files of others may give it, without unit.
@@ -71,9 +67,6 @@ class Signal:
     shortens: bool = False
     lengthens: bool = False
     called: str = ""
-    forwards: str = "moving forwards"
-    backwards: str = "moving back"
-    slowest: float = math.inf
     least_span: float = 0.0
     least_rate: float = 0.0
     stems: tuple[str, ...] = ()
@@ -208,9 +201,6 @@ _ALL: tuple[Signal, ...] = (
         reading="extension",
         has_free_zero=True,
         shortens=True,
-        forwards="shortening",
-        backwards="pulling out",
-        slowest=0.5e-3,
         least_span=1e-3,
         least_rate=1.5e-3,
         stems=("contraction", "displacement", "position", "stroke"),
@@ -280,8 +270,6 @@ _ALL: tuple[Signal, ...] = (
             "theta",
             "phi",
         ),
-        forwards="turning forwards",
-        backwards="turning back",
     ),
     Signal(
         "speed",

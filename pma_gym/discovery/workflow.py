@@ -331,9 +331,9 @@ class _Work:
                 simulated_less_measured(whitened, findings.unseen.readings),
             )
         folds = fold_of_rows(problem.trials, problem.files)
-        answered = findings.given.rig.is_free
-        judged = adequacy(logged, unseen_, fitted, floors, folds, self.seed, answered)
-        if not problem.in_pieces:
+        judged = adequacy(logged, unseen_, fitted, floors, folds, self.seed)
+        # A log cut at its gaps drifts alike in all its pieces.
+        if len(set(problem.files)) == len(problem.trials):
             beside = bool(findings.selection.chosen)
             judged = with_common_drift(judged, logged, fitted.left, problem.noise, beside)
         return replace(findings, adequacy=judged)

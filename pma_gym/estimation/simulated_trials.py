@@ -216,7 +216,7 @@ class SimulatedTrials:
             every: parameters of every trial in each simulation, its start among them.
             tables: of every trial.
         """
-        count, tried, levels = zeros.shape[1], len(vectors), self._levels
+        count, tried, levels = zeros.shape[1], len(vectors), self.deviations
         further = count - tried
         last = np.concatenate([vectors, *([vectors[:1]] * further)])
         logs = [self._trials[i] for i in block]
@@ -270,7 +270,7 @@ class SimulatedTrials:
             batch = self._batch(number, tables, states, zeros, space)
             self.attempts += simulate_batches(self.plant.program, [batch], self.threads)
             readings, least = self._held(space, zeros, last, logged.channels), met.misfit
-            (met,) = initial_states.meet([space], [readings], [logged], self._levels, further)
+            (met,) = initial_states.meet([space], [readings], [logged], self.deviations, further)
             if not met.misfit < least:
                 # Where dry friction sticks, no move of the start tells what the next one does.
                 space[:tried] = before
@@ -288,11 +288,6 @@ class SimulatedTrials:
             for column in (logged.time, logged.motor, logged.regulator)
         )
         return Batch(time, motor, regulator, self.interpolation, tables, states, zeros, space)
-
-    @property
-    def _levels(self) -> Array:
-        """Standard deviations that signals are weighed by where a start is sought (SI)."""
-        return self.deviations
 
     def _every(self, vectors: Array) -> Array:
         """Parameters of every trial at each of some, shape (trials * tried, numbers)."""

@@ -108,7 +108,6 @@ class FitProblem:
         coarse: whether a sensor keeps to coarser steps than its DAQ gives.
         files: the file that each trial comes from; empty where each is a file of its own.
         widens: whether a parameter may go beyond what is assumed of it beforehand.
-        wholes: of which whole trial each is a piece (`short_pieces`); empty where each is whole.
     """
 
     trials: Sequence[Trial]
@@ -119,7 +118,6 @@ class FitProblem:
     coarse: bool = False
     files: tuple[str, ...] = ()
     widens: bool = True
-    wholes: tuple[int, ...] = ()
 
     def whitened_residuals(
         self,
@@ -154,7 +152,7 @@ class FitProblem:
             self.noise,
             prior,
             centre,
-            {path: [each[self._whole(i)] for i in chosen] for path, each in own.items()},
+            {path: [each[i] for i in chosen] for path, each in own.items()},
             threads=self.threads,
             reach=reach,
             lowest=lowest,
@@ -173,25 +171,11 @@ class FitProblem:
             threads=self.threads,
         )
 
-    def _whole(self, number: int) -> int:
-        """The whole trial that a trial is a piece of."""
-        return self.wholes[number] if self.wholes else number
-
     @property
     def runs(self) -> list[int]:
         """Of each trial, the number of the file that it comes from."""
         numbers: dict[str, int] = {}
         return [numbers.setdefault(file, len(numbers)) for file in self.files]
-
-    @property
-    def in_pieces(self) -> bool:
-        """Whether files are taken in pieces, each a trial."""
-        return bool(self.files) and len(set(self.files)) < len(self.trials)
-
-    @property
-    def journal_key(self) -> str:
-        """What tells its fits from those of the same diagnosis with other noise or other pieces."""
-        return f"{self.noise}{f' pieces of {self.wholes}' if self.wholes else ''}"
 
     @cached_property
     def count(self) -> int:
@@ -209,10 +193,7 @@ class FitProblem:
         return np.inf if pieces is None else float(pieces.total()[0, 0])
 
     def steps_a_row(self, model: Model, extra: Sequence[CandidateEffect] = ()) -> float:
-        """Steps of the integrator from one row to the next, in the mean over the trials.
-
-        Those of a free rig's trials that are begun again from a better start count, too.
-        """
+        """Steps of the integrator from one row to the next, in the mean over the trials."""
         whitened = self.whitened_residuals(model, extra)
         whitened.pieces(values(model, [free.path for free in whitened.free]), np.empty(0))
         return whitened.attempts / sum(len(trial.time) for trial in self.trials)

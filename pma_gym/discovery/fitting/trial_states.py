@@ -1,4 +1,4 @@
-"""What belongs to each trial and not to the model: zeros, starts, the trial's own parameters.
+"""What belongs to each trial and not to the model: zeros, the trial's own parameters.
 
 A diagnosis writes them beside the model (`model.toml` and `trials.toml`). Both read back give the
 misfit that it printed, so that nothing that was fitted is lost on the way.
@@ -10,29 +10,22 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import minimize_scalar
 
 from pma_gym.data.datasets.dataset import NamedTrial
-from pma_gym.data.signals import SIGNALS, Signal
+from pma_gym.data.signals import SIGNALS
 from pma_gym.data.trial import MEASUREMENTS, Trial
 from pma_gym.data.trial_columns import BY_NAME, BY_QUANTITY, TrialError
-from pma_gym.discovery.fitting.candidate_effect import CandidateEffect, bounds
+from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
 from pma_gym.discovery.fitting.fit_problem import FitProblem, Fitted
 from pma_gym.discovery.fitting.free_parameters import unit
 from pma_gym.discovery.result.estimates import TrialState
 from pma_gym.documents import read_toml
-from pma_gym.estimation.initial_states import starts
-from pma_gym.estimation.logged import Logged
 from pma_gym.plant.memory_start import memory_states
 from pma_gym.plant.model import Model
 from pma_gym.plant.plant import Plant
 from pma_gym.units import SI_FACTORS
 
 Array = NDArray[np.float64]
-
-SEARCHED, LEAST_SPEED = 0.2, 1.0
-"""How far about a starting velocity the best one is searched, as a share of it, and the least speed
-(in the unit of a model file, mm/s or deg/s) that the share is of."""
 
 
 def trial_states(
@@ -43,74 +36,19 @@ def trial_states(
     for candidate in chosen:
         own |= candidate.own
     whitened = problem.whitened_residuals(fit.model, chosen)
-    free = fit.model.rig.start_paths
-    begins = free or memory_states(fit.model)
-    begun = whitened.first_states(fit.values) if begins else None
-    levels = [each.level for each in problem.noise]
+    memories = memory_states(fit.model)
+    begun = whitened.first_states(fit.values) if memories else None
     by_trial = {}
     for i, name in enumerate(names):
         parameters = {path: each[i] / SI_FACTORS[unit(path)] for path, each in own.items()}
         if begun is not None:
             states = dict(zip(whitened.plant.states, begun[i].tolist(), strict=True))
             parameters |= {
-                path: states[state] / SI_FACTORS[unit(path)] for state, path in begins.items()
+                path: states[state] / SI_FACTORS[unit(path)] for state, path in memories.items()
             }
-        if free:
-            parameters = _started(fit.model, problem.trials[i], parameters, levels)
         held = simulated(fit.model, problem.trials[i], TrialState({}, parameters))
         by_trial[name] = TrialState(_zeros(problem.trials[i], held), parameters)
     return by_trial
-
-
-def _started(
-    model: Model, trial: Trial, parameters: Mapping[str, float], levels: Sequence[float]
-) -> dict[str, float]:
-    """A trial's own parameters with the starting velocity that fits it best.
-
-    A fit moves simulations along a derivative to the velocity that fits best, which is exact to
-    first order. Dry friction is not of first order, so the velocity itself is searched here, about
-    the derivative's.
-    """
-    path = _speed_path(model)
-    about = _possible(model, trial, parameters[path])
-    parameters = {**parameters, path: about}
-
-    def off(velocity: float) -> float:
-        held = simulated(model, trial, TrialState({}, {**parameters, path: velocity}))
-        return sum(
-            _misfit(each, row - trial.measurements[each.name]) / level**2
-            for each, row, level in zip(model.rig.signals, held.values(), levels, strict=True)
-            if each.name in trial.measurements
-        )
-
-    reach = SEARCHED * max(abs(about), LEAST_SPEED)
-    (low,), (high,) = bounds([path])
-    around = max(about - reach, low), min(about + reach, high)
-    best = minimize_scalar(off, bounds=around, method="bounded")
-    fits_better = best.fun < off(about)  # type: ignore[attr-defined]
-    return {**parameters, path: float(best.x) if fits_better else about}  # type: ignore[attr-defined]
-
-
-def _misfit(signal: Signal, left: Array) -> float:
-    """Mean square of what is left of a signal (SI), about its mean where its zero is free."""
-    known = left[np.isfinite(left)]
-    if not known.size:
-        return 0.0
-    return float(np.var(known) if signal.has_free_zero else np.mean(known**2))
-
-
-def _possible(model: Model, trial: Trial, velocity: float) -> float:
-    """A starting velocity (mm/s), or that of the first readings where no rig has one like it.
-
-    Where dry friction holds a rig, its motion hardly depends on how fast it begins, and a
-    derivative leads anywhere.
-    """
-    path = _speed_path(model)
-    (low,), (high,) = bounds([path])
-    if low <= velocity <= high:
-        return velocity
-    _, read = starts([trial], [Logged.of(model, 0, trial)])
-    return float(np.clip(read[0] / SI_FACTORS[unit(path)], low, high))
 
 
 def simulated(model: Model, trial: Trial, state: TrialState) -> dict[str, Array]:
@@ -208,8 +146,3 @@ def _zeros(trial: Trial, held: Mapping[str, Array]) -> dict[str, float]:
                 column = BY_QUANTITY[name]
                 zeros[column.name] = float(np.nanmean(off)) / SI_FACTORS[column.unit]
     return zeros
-
-
-def _speed_path(model: Model) -> str:
-    """Where a model file says how fast a trial of a rig begins that nothing holds."""
-    return list(model.rig.start_paths.values())[-1]

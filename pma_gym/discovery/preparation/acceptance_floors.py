@@ -126,7 +126,7 @@ def _rest(logged: Sequence[Logged], channel: int) -> float | None:
     count = sum(len(part) for part in segments)
     if count < ENOUGH:
         return None
-    # What still settles, or a slide that a held force drives, bends away from a line.
+    # What still settles bends away from a line.
     squares = sum(float(np.sum(_about_parabola(part) ** 2)) for part in segments)
     level = float(np.sqrt(squares / (count - 3 * len(segments))))
     if sum(_turns(part, PLAIN * level) for part in segments) < STILL * count:

@@ -2,13 +2,12 @@
 
 What repeats with the command is structure; only what does not repeat may be noise. Two trials with
 the same times and commands differ by their noise alone, less what follows the state or the command
-(a rig that warms up between them): that is taken out first. Within a piece of a run a slow drift is
-little more than a constant, so repeated pieces tell that, too. Without repeats, long rest segments
+(a rig that warms up between them): that is taken out first. Without repeats, long rest segments
 tell the colour, and nothing tells a drift.
 """
 
 import math
-from collections.abc import Container, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -65,10 +64,7 @@ def learnt_noise(
         (i, j) for group in repeats(logged, named) for i, j in zip(group, group[1:], strict=False)
     ]
     learnt = []
-    pieces = {i for i, each in enumerate(named) if each.file is not None}
-    drifts = [
-        _drift(logged, pairs, channel, pieces, each.level) for channel, each in enumerate(noise)
-    ]
+    drifts = [_drift(logged, pairs, channel, each.level) for channel, each in enumerate(noise)]
     surely = any(each.chance < CHANCE / len(noise) for each in drifts)
     shares = [each.share for each in drifts if np.isfinite(each.share)]
     usual = float(np.sqrt(np.mean(np.square(shares)))) if shares else 0.0
@@ -81,10 +77,6 @@ def learnt_noise(
         after = _coloured(before, logged, pairs, channel, waves, is_drifting)
         if is_drifting:
             after = replace(after, drift=share * before.level, waves=waves)
-        if drifts[channel].offset_chance < CHANCE / len(noise):
-            offset = UNSURE * drifts[channel].offset
-            if offset > LEAST_DRIFT:
-                after = replace(after, offset=offset * before.level)
         learnt.append(after)
     return tuple(learnt)
 
@@ -117,22 +109,17 @@ class _Drift:
         share: of the noise (rms), NaN if unknown.
         chance: how likely by chance.
         waves: half waves of it in a trial, beyond those that commands leave free; else 0.
-        offset: share of the noise (rms) of the constants by which pieces of runs differ.
-        offset_chance: how likely that is by chance.
     """
 
     share: float
     chance: float
     waves: int = 0
-    offset: float = 0.0
-    offset_chance: float = 1.0
 
 
 def _drift(
     logged: Sequence[Logged],
     pairs: Sequence[tuple[int, int]],
     channel: int,
-    pieces: Container[int],
     noise_level: float,
 ) -> _Drift:
     """Drift of a signal: how much repeats differ by slow cosines, beyond what noise does.
@@ -141,11 +128,9 @@ def _drift(
         logged: the trials.
         pairs: which of them repeat each other.
         channel: the signal.
-        pieces: which are pieces of runs.
         noise_level: standard deviation of its noise (SI).
     """
     squares, total, least = [], 0.0, MOST_WAVES
-    means, rows = [], 0
     for i, j in pairs:
         apart = _apart(logged[i], logged[j], channel)
         if not apart.size:
@@ -155,9 +140,6 @@ def _drift(
         apart = np.interp(at, at[there], apart[there])
         squares.append((_cosines(len(apart), MOST_WAVES + NEAR) @ (apart - apart.mean())) ** 2)
         total += len(apart)
-        if i in pieces and j in pieces:
-            means.append(len(apart) * float(apart.mean()) ** 2)
-            rows += len(apart)
         least = min(least, half_periods(logged[i]))
     if not squares:
         return _Drift(np.nan, 1.0)
@@ -175,10 +157,7 @@ def _drift(
     # Coloured noise has more at these frequencies than its standard deviation says.
     per_noise = math.sqrt(level) / noise_level
     share = per_noise * math.sqrt(max(slow - count, 0.0) / total)
-    constant = sum(means) / level
-    offset = per_noise * math.sqrt(max(constant - len(means), 0.0) / max(rows, 1))
-    by_chance = float(chi2.sf(constant, len(means))) if means else 1.0
-    return _Drift(float(share), float(chi2.sf(slow, count)), waves, offset, by_chance)
+    return _Drift(float(share), float(chi2.sf(slow, count)), waves)
 
 
 def _cosines(rows: int, count: int) -> Array:

@@ -67,7 +67,6 @@ class Whitening:
         lines: frequencies (Hz) of lines beside it, of free amplitude and phase in every trial.
         drift: root mean square of a slow drift beside it, another in every trial (SI).
         waves: half waves that the drift has in a trial at least, as repeats tell.
-        offset: standard deviation of a constant beside it, another in every piece of a run (SI).
     """
 
     coefficients: tuple[float, ...]
@@ -76,12 +75,11 @@ class Whitening:
     lines: tuple[float, ...] = ()
     drift: float = 0.0
     waves: int = 0
-    offset: float = 0.0
 
     @property
     def has_nuisances(self) -> bool:
         """Whether there is anything beside it."""
-        return bool(self.lines or self.drift or self.offset)
+        return bool(self.lines or self.drift)
 
     def white(self, series: Array, missing: NDArray[np.int64]) -> Array:
         """Whitened series, shape (..., rows); 0 where a reading is missing.

@@ -106,9 +106,8 @@ def _project(noise: Whitening, logged: Logged, channel: int, free_zero: bool) ->
     known: list[Array] = []
     if noise.drift > 0.0:
         known = [noise.drift * each for each in drift_columns(logged, noise.waves)]
-    constant = math.hypot(noise.drift, noise.offset)
-    if constant > 0.0 and not free_zero:
-        known.append(np.full(len(time), constant))
+        if not free_zero:
+            known.append(np.full(len(time), noise.drift))
 
     def white(columns: list[Array]) -> Array:
         rows = np.reshape(columns, (-1, len(time))).copy()

@@ -116,10 +116,6 @@ class WhitenedResiduals(Residuals):
         self._constants: dict[tuple[int, int], tuple[Array, float]] = {}
 
     @property
-    def _levels(self) -> Array:
-        return np.array([each.level for each in self.noise])
-
-    @property
     def logged(self) -> list[Logged]:
         """The trials as they are read."""
         return self._trials

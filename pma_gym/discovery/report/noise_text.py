@@ -1,6 +1,5 @@
 """Nuisances that were fitted together with every candidate, and their names in the report."""
 
-import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -36,9 +35,8 @@ def nuisances(findings: Findings) -> tuple[Nuisance, ...]:
         for hertz in noise.lines:
             size = line_size(hertz, whitened.logged, parts) / noise.level
             lines.setdefault(round(hertz, 6), {})[column] = size
-        drift = math.hypot(noise.drift, noise.offset)
-        if drift:
-            drifts[column] = drift / UNSURE / noise.level
+        if noise.drift:
+            drifts[column] = noise.drift / UNSURE / noise.level
         if noise.coefficients:
             correlation = float(autocorrelation(noise, 2)[1])
             if abs(correlation) > LEAST_COLOUR:

@@ -211,23 +211,16 @@ def twin(path: str, fit: Fitted) -> str | None:
     return fit.paths[int(np.argmax(alike))] if alike.max(initial=0.0) > ALIKE else None
 
 
-def _freed(findings: Findings) -> str:
-    """What is free in every trial besides."""
-    zeros = [each.name for each in findings.given.rig.signals if each.has_free_zero]
-    starts = ["where it begins and how fast"] * findings.given.rig.is_free
-    zeros = [f"the zeros of {' and '.join(zeros)}"] * bool(zeros)
-    return f"with {' and '.join(zeros + starts)} free in every trial"
-
-
 def steps(findings: Findings, diagnosis: Diagnosis, left: ResidualFraction) -> tuple[str, ...]:
     """What was done, a sentence each."""
     problem, selection = findings.problem, findings.selection
     beside = nuisance_text(diagnosis.nuisances, len(diagnosis.floors))
+    zeros = [each.name for each in findings.given.rig.signals if each.has_free_zero]
     said = [
         f"Noise: {', '.join(_floor(diagnosis, signal) for signal in diagnosis.floors)}."
         + (f" Fitted together with every candidate: {beside}." if beside else ""),
         f"Parameters first: {len(problem.own.free)} parameters of {findings.given.name} were "
-        f"refitted, {_freed(findings)}; each is held to "
+        f"refitted, with the zeros of {' and '.join(zeros)} free in every trial; each is held to "
         "its value as by a measurement with 10 % error, which counts only where the trials do not "
         "determine it.",
     ]

@@ -19,8 +19,13 @@ from pma_gym.data.signals import Signal
 from pma_gym.discovery.fitting.fit_problem import Fitted
 from pma_gym.discovery.preparation.whitened_residuals import WhitenedResiduals
 from pma_gym.discovery.result.misfit import Map, Place
-from pma_gym.discovery.screening.condition_axes import condition_axes
-from pma_gym.discovery.screening.regions import LARGEST, SMALLEST, Region, single_regions
+from pma_gym.discovery.screening.regions import (
+    LARGEST,
+    SMALLEST,
+    Region,
+    level_axes,
+    single_regions,
+)
 from pma_gym.discovery.screening.residual_maps import residual_map
 from pma_gym.discovery.screening.residuals import simulated_less_measured
 from pma_gym.discovery.screening.time_bins import PIECE_BINS, TimeBins, time_bins
@@ -84,7 +89,7 @@ def _has_gap(bins: TimeBins, channel: int) -> bool:
 def _places(
     bins: TimeBins, signals: Sequence[Signal], seen: Sequence[int], seed: int
 ) -> tuple[Place, ...]:
-    singles = single_regions(bins, condition_axes(signals))
+    singles = single_regions(bins, level_axes(signals))
     regions = singles + [
         Region(first.kinds + second.kinds, "", first.inside & second.inside)
         for first, second in combinations(singles, 2)

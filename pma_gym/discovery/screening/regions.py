@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pma_gym.discovery.screening.condition_axes import ConditionAxes
+from pma_gym.data.signals import Signal
 from pma_gym.discovery.screening.time_bins import TimeBins
 
 Array = NDArray[np.float64]
@@ -14,6 +14,34 @@ Mask = NDArray[np.bool_]
 
 SMALLEST, LARGEST = 0.02, 0.9
 """Shares of a signal's readings between which a region is one."""
+
+
+@dataclass(frozen=True)
+class Axis:
+    """A condition that has a size.
+
+    Attributes:
+        kind: its field in `TimeBins`.
+        words: what it is.
+        unit: what it is given in there.
+    """
+
+    kind: str
+    words: str
+    unit: str
+
+
+SPEED = Axis("speed", "speed of contraction", "mm/s")
+
+
+def level_axes(signals: Sequence[Signal]) -> tuple[Axis, ...]:
+    """Pressure, force and position of a rig, as its signals are called."""
+    (force,) = (each.name for each in signals if each.measures == "force")
+    return (
+        Axis("pressure", "pressure", "kPa"),
+        Axis("load", force, "N"),
+        Axis("position", "contraction", "mm"),
+    )
 
 
 @dataclass(frozen=True)
@@ -31,15 +59,15 @@ class Region:
     inside: Mask
 
 
-def single_regions(bins: TimeBins, axes: ConditionAxes) -> list[Region]:
+def single_regions(bins: TimeBins, levels: Sequence[Axis]) -> list[Region]:
     """Regions of one condition, those of motion first, as a person says them.
 
     Args:
         bins: all trials.
-        axes: what the rig's conditions are called and given in.
+        levels: pressure, force and position of the rig.
     """
     there = np.isfinite(bins.order)
-    held, speed, unit = bins.held, bins.speed, axes.speed.unit
+    held, speed = bins.held, bins.speed
     named: list[tuple[str, str, Mask]] = []
     for kind, words in (("reversal", "reversals"), ("step", "steps of a command")):
         since = np.where(there, getattr(bins, kind), np.nan)
@@ -48,23 +76,24 @@ def single_regions(bins: TimeBins, axes: ConditionAxes) -> list[Region]:
     named.append(("motion", "while held", held > 0.0))
     named.append(("motion", "while held, more than 1 s after the last motion", held > 1.0))
     moving = held == 0.0
-    for sign, words in ((1.0, axes.forwards), (-1.0, axes.backwards)):
+    for sign, words in ((1.0, "shortening"), (-1.0, "pulling out")):
         along = np.where(moving, sign * speed, np.nan)
         named.append(("motion", f"while {words}", along > 0.0))
         named += [
-            ("motion", f"{words} faster than {v:g} {unit}", along > v)
+            ("motion", f"{words} faster than {v:g} {SPEED.unit}", along > v)
             for v in _round_cuts(along[along > 0.0], (0.5, 0.8))
         ]
     named.append(("motion", "while moving", moving))
     crawl = _round_cuts(np.abs(speed[moving]), (0.3,))
     named += [
-        ("motion", f"moving slower than {v:g} {unit}", moving & (abs(speed) < v)) for v in crawl
+        ("motion", f"moving slower than {v:g} {SPEED.unit}", moving & (abs(speed) < v))
+        for v in crawl
     ]
     phases = ("before the first command", "between the first command and the last", "")
     for number, words in enumerate(phases[:2]):
         named.append(("phase", words, bins.phase == number))
     named.append(("phase", "in the final hold", bins.phase == 2.0))
-    for axis in axes.levels:
+    for axis in levels:
         values = getattr(bins, axis.kind)
         # A pressure is known by its unit.
         name = "" if axis.kind == "pressure" else f"{axis.words} "

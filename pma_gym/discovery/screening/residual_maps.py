@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from pma_gym.data.signals import Signal
 from pma_gym.discovery.result.misfit import Map
-from pma_gym.discovery.screening.condition_axes import Axis, condition_axes
+from pma_gym.discovery.screening.regions import SPEED, Axis, level_axes
 from pma_gym.discovery.screening.time_bins import TimeBins
 
 Array = NDArray[np.float64]
@@ -30,10 +30,8 @@ def residual_map(bins: TimeBins, channel: int, signals: Sequence[Signal]) -> Map
         channel: which of the rig's signals.
         signals: what the rig measures.
     """
-    known = condition_axes(signals)
-    axes = {
-        axis.kind: f"{axis.words} ({axis.unit})" for axis in (*known.levels, known.speed, *_TIMES)
-    }
+    known = (*level_axes(signals), SPEED, *_TIMES)
+    axes = {axis.kind: f"{axis.words} ({axis.unit})" for axis in known}
     total, counts = bins.total[channel], bins.counts[channel]
     edges = {name: _edges(getattr(bins, name)[counts > 0]) for name in axes}
     best = None

@@ -41,8 +41,7 @@ def reestimated_noise(
         learnt = autoregression(known, before.level) if known else before
         if known and learnt.level > STRUCTURE * before.level:
             learnt = replace(learnt, coefficients=(), innovation=learnt.level)
-        nuisances = {"drift": before.drift, "waves": before.waves, "offset": before.offset}
-        filters.append(replace(learnt, lines=before.lines, **nuisances))
+        filters.append(replace(learnt, lines=before.lines, drift=before.drift, waves=before.waves))
     return tuple(filters)
 
 
@@ -120,10 +119,9 @@ def autocorrelation_tests(
 ) -> dict[str, AutocorrelationTest]:
     """Autocorrelation test of the residual of each output.
 
-    Nothing beside a coarse sensor, whose rounding follows the motion; nor of a slide, whose starts
-    are taken from readings, so that what is left remembers their noise.
+    Nothing beside a coarse sensor, whose rounding follows the motion.
     """
-    if not _tells(problem):
+    if problem.coarse:
         return {}
     whitened = problem.whitened_residuals(fit.model, chosen)
     left, signals = residuals(whitened, fit), whitened.logged[0].signals
@@ -137,8 +135,8 @@ def autocorrelation_tests(
 
 
 def scan_of_fit(problem: FitProblem, fit: Fitted) -> ScanStatistic:
-    """Scan statistic of what a fit leaves of all signals; 1 where no residual can be judged."""
-    if not _tells(problem):
+    """Scan statistic of what a fit leaves of all signals; 1 beside a coarse sensor."""
+    if problem.coarse:
         return NO_EXCESS
     whitened = problem.whitened_residuals(fit.model)
     left, logged = residuals(whitened, fit), whitened.logged
@@ -151,8 +149,3 @@ def scan_of_fit(problem: FitProblem, fit: Fitted) -> ScanStatistic:
     ]
     chance = min(1.0, len(scans) * min(each.chance for each in scans))
     return ScanStatistic(chance, sum(each.excess for each in scans))
-
-
-def _tells(problem: FitProblem) -> bool:
-    """Whether a residual tells of itself what is noise."""
-    return not problem.coarse and not problem.given.rig.is_free

@@ -13,9 +13,6 @@ from pma_gym.units import SI_FACTORS
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-POSITIONS = ("displacement", "angle")
-"""What a position may measure."""
-
 BIN_S = 0.05
 """Readings of so long (s) are taken together: finer than any region."""
 
@@ -24,8 +21,10 @@ PIECE_BINS = 20
 plant."""
 
 MOVING = 0.05
-"""Slowest speed that counts as motion, as a share of the largest in all trials; a signal may count
-a slower one (`Signal.slowest`)."""
+"""Slowest speed that counts as motion, as a share of the largest in all trials."""
+
+SLOWEST = 0.5e-3
+"""The same in m/s, where that is less."""
 
 SMOOTH_S = 0.03
 """Width of the mean over simulated position that speed is taken of (s): not each slip of dry
@@ -44,10 +43,10 @@ class TimeBins:
         excess: sum of residual squared less 1, in units of noise, shape (signals, n).
         total: sum of the residual, shape (signals, n).
         counts: readings, shape (signals, n); 0 where a tick is padding.
-        pressure: in its file unit (kPa), as simulated, as all conditions; 0 without one.
-        load: force or torque that is measured, in its file unit; 0 without one.
-        position: contraction or angle, in its file unit.
-        speed: of that, in its file unit a second; positive where the position grows.
+        pressure: in kPa, as simulated, as all conditions.
+        load: force that is measured (N).
+        position: contraction (mm).
+        speed: of that (mm/s); positive where it grows.
         reversal: time since the last reversal of motion (s); infinite before the first.
         step: time since the last step of a command (s); infinite before the first.
         held: time since the last motion (s), 0 while moving.
@@ -80,10 +79,11 @@ def time_bins(
         residuals: those less what was measured, in units of the noise, NaN where nothing was.
     """
     speeds = [
-        _speed(logged.time, logged.row(held, *POSITIONS))
+        _speed(logged.time, logged.row(held, "displacement"))
         for logged, held in zip(logs, readings, strict=True)
     ]
-    still, steps = _stillness(logs[0], speeds), _step_sizes(logs)
+    still = min(SLOWEST, MOVING * max(float(np.abs(each).max()) for each in speeds))
+    steps = _step_sizes(logs)
     parts = []
     for number, (logged, held, residual) in enumerate(zip(logs, readings, residuals, strict=True)):
         order = number / max(len(logs) - 1, 1)
@@ -121,13 +121,6 @@ def _padded(values: Array, spare: int) -> Array:
     return np.pad(values, (0, spare), constant_values=np.nan)
 
 
-def _stillness(logged: Logged, speeds: Sequence[Array]) -> float:
-    """Speed (SI) from which on a rig moves."""
-    at = logged.channel(*POSITIONS)
-    slowest = np.inf if at is None else logged.signals[at].slowest
-    return min(slowest, MOVING * max(float(np.abs(each).max()) for each in speeds))
-
-
 def _step_sizes(logs: Sequence[Logged]) -> tuple[float, float]:
     """Least step of each command."""
     low, high = VOLTAGE_RANGE
@@ -154,26 +147,15 @@ def _conditions(
         phase[rows[0] :] = 1.0
         phase[rows[-1] + 1 :] = 2.0
     return {
-        "pressure": _in_unit(logged, held, "pressure"),
-        "load": _in_unit(logged, held, "force", "torque"),
-        "position": _in_unit(logged, held, *POSITIONS),
-        "speed": speed / _factor(logged, *POSITIONS),
+        "pressure": logged.row(held, "pressure") / SI_FACTORS["kPa"],
+        "load": logged.row(held, "force"),
+        "position": logged.row(held, "displacement") / SI_FACTORS["mm"],
+        "speed": speed / SI_FACTORS["mm/s"],
         "reversal": _since(time, turned),
         "step": _since(time, _stepped(logged, steps)),
         "held": np.where(moving, 0.0, np.maximum(rested, 1e-9)),
         "phase": phase,
     }
-
-
-def _factor(logged: Logged, *measures: str) -> float:
-    """SI units in the file unit of the first signal that measures one of some quantities."""
-    at = logged.channel(*measures)
-    return 1.0 if at is None else SI_FACTORS[logged.signals[at].unit]
-
-
-def _in_unit(logged: Logged, held: Array, *measures: str) -> Array:
-    """The first signal that measures one of some quantities, in its file unit; 0 without one."""
-    return logged.row(held, *measures) / _factor(logged, *measures)
 
 
 def _speed(time: Array, position: Array) -> Array:

@@ -6,7 +6,6 @@ from dataclasses import replace
 import numpy as np
 
 from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
-from pma_gym.discovery.fitting.fewer_pieces import with_fewer_pieces
 from pma_gym.discovery.fitting.fit_problem import FitProblem, Fitted
 from pma_gym.discovery.fitting.free_parameters import values
 from pma_gym.discovery.fitting.journal import Journal
@@ -100,7 +99,7 @@ def fitted(
     caught: bool = False,
 ) -> Fitted | None:
     """The best of fits from the probes that explain most; of more where others were caught."""
-    begun_at = f"{problem.journal_key} {before.names} {before.values.tolist()}"
+    begun_at = f"{problem.noise} {before.names} {before.values.tolist()}"
     key = f"{begun_at} {each.candidate.name} {each.starts}{' caught' * caught}"
     extra = (*chosen, each.candidate)
     kept = journal.restored(key, lambda entry: restored(entry, problem, before, extra))
@@ -108,24 +107,21 @@ def fitted(
         return kept
     best: Fitted | None = None
     whitened = probed(problem, before, each.candidate)
-    searched = with_fewer_pieces(problem) if caught else problem
     for model, begun in _beginnings(problem, baseline, whitened, before, each, caught):
-        fit = searched.fit(model, extra, {each.candidate.name: begun})
+        fit = problem.fit(model, extra, {each.candidate.name: begun})
         if fit is not None and caught:
-            fit = searched.continuation(fit, extra)
+            fit = problem.continuation(fit, extra)
         alike = _alike(best, fit)
         if fit is not None and (best is None or fit.chi_square < best.chi_square):
             best = fit
         # As much as the look promised, or near at last: no other beginning is needed. Nor is one
         # where the last two ended alike.
         if best is not None and (
-            alike or not searched.far(best)
+            alike or not problem.far(best)
             if caught
             else before.chi_square - best.chi_square >= each.gain
         ):
             break
-    if best is not None and searched is not problem:
-        best = problem.fit(best.model, extra)
     kept = 0.0 if best is None else before.chi_square - best.chi_square
     # Far from the trials a promise of less than two like fits differ by is not worth a scan.
     slight = problem.far(before) and each.gain < ALIKE * before.chi_square
@@ -296,10 +292,9 @@ def better(
         best = problem.continuation(best, chosen)
         if not is_rugged(best, chosen):
             return best
-        # Where most of the misfit is left another effect is looked for first; what short pieces
-        # find is fitted to the trials anyway.
+        # Where most of the misfit is left another effect is looked for first.
         carries = best.chi_square < MOST_LEFT * before.chi_square
-        return best_of_optima(problem, best, chosen, refines=carries and not problem.wholes)
+        return best_of_optima(problem, best, chosen, refines=carries)
 
     return _once("better", problem, fit, chosen, journal, search)
 
@@ -333,7 +328,7 @@ def _once(
     search: Callable[[], Fitted],
 ) -> Fitted:
     """What a search from a fit found, from the journal where it was made before."""
-    key = f"{what} {problem.journal_key} {fit.names} {fit.values.tolist()}"
+    key = f"{what} {problem.noise} {fit.names} {fit.values.tolist()}"
     kept = journal.restored(key, lambda entry: restored(entry, problem, fit, chosen))
     if kept is not None:
         return kept

@@ -5,11 +5,12 @@ explain more: a spring stands for a hardening spring as long as damping that dep
 missing.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
 from pma_gym.discovery.fitting.fit_problem import FitProblem, Fitted
 from pma_gym.discovery.selection.candidate_fits import cost, starting_values, stripped
+from pma_gym.discovery.selection.stages import Stage
 
 TRIED = 4
 """How many effects are tried in the place of one: those that explained most there."""
@@ -22,32 +23,29 @@ LEAST = 30.0
 
 Chosen = tuple[CandidateEffect, ...]
 
-Round = tuple[Fitted, Mapping[str, Fitted]]
-"""A round of the selection: what candidates were fitted beside, and their fits by name."""
-
 
 def exchanged(
     problem: FitProblem,
     fit: Fitted,
     chosen: Chosen,
-    rounds: Sequence[Round],
+    stages: Sequence[Stage],
     candidates: Sequence[CandidateEffect],
-    places: Iterable[int],
 ) -> tuple[Chosen, Fitted]:
     """The effects and their fit, each in turn exchanged for one that explains more beside the rest.
+
+    The last stays: it was the best beside all others already.
 
     Args:
         problem: the trials.
         fit: the fit of the effects.
         chosen: the effects, in the order in which they were selected.
-        rounds: of the selection.
+        stages: of the selection.
         candidates: the whole catalogue.
-        places: of the effects that may be exchanged.
     """
     known = {candidate.name: candidate for candidate in candidates}
-    for place in places:
+    for place in range(len(chosen) - 1):
         taken = {each.name for each in chosen}
-        fits, most = _near(chosen[place].name, rounds)
+        fits, most = _near(chosen[place].name, stages)
         near = [name for name in set(fits) - taken if fits[name].chi_square < most]
         for name in sorted(near, key=lambda name: cost(fits[name]))[:TRIED]:
             others = (*chosen[:place], known[name], *chosen[place + 1 :])
@@ -59,10 +57,10 @@ def exchanged(
     return chosen, fit
 
 
-def _near(name: str, rounds: Sequence[Round]) -> tuple[Mapping[str, Fitted], float]:
+def _near(name: str, stages: Sequence[Stage]) -> tuple[Mapping[str, Fitted], float]:
     """Fits of the round in which an effect was selected, and the most chi-square that is near."""
-    for before, fits in rounds:
-        if name in fits:
-            gain = before.chi_square - fits[name].chi_square
-            return fits, before.chi_square - LEAST_GAIN * gain
+    for stage in stages:
+        if name in stage.fits:
+            most = stage.before.chi_square
+            return stage.fits, most - LEAST_GAIN * (most - stage.fits[name].chi_square)
     return {}, 0.0

@@ -4,9 +4,8 @@ In each round (`stages`) every candidate is scored; what passes the gate is fitt
 model's parameters; the likeliest is added; then the same again beside it. Each effect is then left
 out once, and stays out if the fit is as good without it, or is exchanged for another that explains
 more beside the rest. Where nothing passes any more, further terms of the laws that were added are
-fitted (`further_terms`). Where a free rig is far from its trials all this happens in short pieces
-of them first, and goes on in the trials beside what holds there. The noise is estimated again only
-when all effects are selected: before, an autoregression would take the next effect for noise.
+fitted (`further_terms`). The noise is estimated again only when all effects are selected: before,
+an autoregression would take the next effect for noise.
 """
 
 from collections.abc import Mapping, Sequence
@@ -17,19 +16,17 @@ from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
 from pma_gym.discovery.fitting.covariance import covariance
 from pma_gym.discovery.fitting.fit_problem import FitProblem, Fitted
 from pma_gym.discovery.fitting.journal import Journal
-from pma_gym.discovery.fitting.short_pieces import in_short_pieces
 from pma_gym.discovery.result.estimates import Undetermined
 from pma_gym.discovery.screening.residuals import reestimated_noise
 from pma_gym.discovery.selection.candidate_fits import (
     LEAST_GAIN,
-    MOST_LEFT,
     better,
     carries_the_rest,
     cost,
     refit,
     without_idle,
 )
-from pma_gym.discovery.selection.exchanged_effects import Round, exchanged
+from pma_gym.discovery.selection.exchanged_effects import exchanged
 from pma_gym.discovery.selection.further_terms import further_terms
 from pma_gym.discovery.selection.instead_of_terms import instead_of_term
 from pma_gym.discovery.selection.rugged_fits import is_rugged, settled
@@ -46,9 +43,6 @@ BEGINNINGS = 3
 
 MOST_EFFECTS = 3
 """Most effects that are added."""
-
-SHORT_PIECES = 40
-"""How many short pieces of a free rig's trials are searched first."""
 
 
 @dataclass(frozen=True)
@@ -91,87 +85,27 @@ def select(
         journal: keeps fits.
         progress: called with a step's name, what is done and the total.
     """
-    begun = Added((), (), refitted, refitted)
-    if problem.given.rig.is_free and problem.far(refitted):
-        begun = _begun_in_short_pieces(problem, begun, candidates, seed, journal, progress)
-    added = _with_added(problem, begun, candidates, seed, journal, progress)
-    chosen, best, refitted = added.chosen, added.fit, added.refitted
-    # The last was the best beside all others already.
-    rounds, places = _rounds(added.stages), range(len(chosen) - 1)
-    chosen, best = exchanged(problem, best, chosen, rounds, candidates, places)
+    added = _with_added(problem, refitted, candidates, seed, journal, progress)
+    chosen, best = exchanged(problem, added.fit, added.chosen, added.stages, candidates)
     problem = replace(problem, noise=reestimated_noise(problem, best, chosen))
     fit = refit(problem, best, chosen, journal)
     chosen, fit = with_scanned(problem, fit, chosen, journal, ends_rigid=True)
     if is_rugged(fit, chosen):
         fit = settled(problem, replace(fit, spread=best.spread), chosen)
     fit = replace(fit, covariance=covariance(problem, fit, chosen))
-    return Selection(added.stages, chosen, fit, problem, refitted)
-
-
-@dataclass(frozen=True)
-class Added:
-    """Effects that were added one after the other: as `Selection`, before its last fits.
-
-    Attributes:
-        chosen: the effects.
-        stages: the rounds.
-        fit: the model with them.
-        refitted: the model with its own parameters refitted alone.
-    """
-
-    chosen: tuple[CandidateEffect, ...]
-    stages: tuple[Stage, ...]
-    fit: Fitted
-    refitted: Fitted
-
-
-def _begun_in_short_pieces(
-    problem: FitProblem,
-    begun: Added,
-    candidates: Sequence[CandidateEffect],
-    seed: int,
-    journal: Journal,
-    progress: Progress,
-) -> Added:
-    """What short pieces of a free rig's trials say is missing, where that holds for the trials.
-
-    In a second an error of force leads a free rig so far away that fits of the right effect end in
-    local minima, and that effects beside it do not show. In a quarter of a second it does not.
-    """
-    short = in_short_pieces(problem, SHORT_PIECES)
-    refitted = short.careful_fit(problem.given)
-    if short is problem or refitted is None:
-        return begun
-    first = Added((), (), refitted, refitted)
-    added = _with_added(short, first, candidates, seed, journal, progress)
-    chosen, scale = added.chosen, begun.fit.chi_square / added.refitted.chi_square
-    stages = tuple(replace(each, scale=scale) for each in added.stages[: len(chosen)])
-    if not chosen:
-        return begun
-    fit = problem.fit(added.fit.model, chosen)
-    if fit is None or not fit.chi_square < MOST_LEFT * begun.fit.chi_square:
-        return begun
-    # What explains most in short pieces need not in longer ones.
-    places = range(len(chosen))
-    chosen, fit = exchanged(problem, fit, chosen, _rounds(stages), candidates, places)
-    return replace(begun, chosen=chosen, stages=stages, fit=replace(fit, spread=added.fit.spread))
-
-
-def _rounds(stages: Sequence[Stage]) -> list[Round]:
-    return [(each.before, each.fits) for each in stages]
+    return replace(added, chosen=chosen, fit=fit, problem=problem)
 
 
 def _with_added(
     problem: FitProblem,
-    begun: Added,
+    refitted: Fitted,
     candidates: Sequence[CandidateEffect],
     seed: int,
     journal: Journal,
     progress: Progress,
-) -> Added:
-    """With all effects that the residual asks for, beside those there are."""
-    chosen, stages = begun.chosen, list(begun.stages)
-    best, refitted, anew = begun.fit, begun.refitted, 0
+) -> Selection:
+    """All effects that the residual asks for, before their last fits."""
+    chosen, stages, best, anew = (), [], refitted, 0
     while len(chosen) < MOST_EFFECTS:
         taken = {candidate.name for candidate in chosen}
         rest = [candidate for candidate in candidates if candidate.name not in taken]
@@ -200,7 +134,7 @@ def _with_added(
         elif len(chosen) < len(stages):
             # One is not missed beside the other, and that is the end of it.
             break
-    return Added(chosen, tuple(stages), best, refitted)
+    return Selection(tuple(stages), chosen, best, problem, refitted)
 
 
 def _likeliest(stage: Stage, first: Stage) -> str | None:
@@ -230,4 +164,4 @@ def _is_worth(first: Stage, stage: Stage, gain: float) -> bool:
         return True
     least = min(first.fits.values(), key=cost)
     share = SURE_SHARE if stage.missing else SECOND_SHARE
-    return gain >= share * first.scale * (first.before.chi_square - least.chi_square)
+    return gain >= share * (first.before.chi_square - least.chi_square)

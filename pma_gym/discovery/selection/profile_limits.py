@@ -57,24 +57,20 @@ def _scales(
     travel, speed, pressure, seconds = 0.0, 0.0, 0.0, 0.0
     for held, logged in zip(readings, whitened.logged, strict=True):
         # A model that lacks much may run away; what was measured did not.
-        contraction, time = _known(logged, held, ("displacement", "angle"))
+        contraction, time = _known(logged, held, "displacement")
         travel = max(travel, float(np.ptp(contraction)))
         speed = max(speed, float(np.abs(np.gradient(contraction, time)).max()))
-        pressure = max(pressure, float(np.ptp(_known(logged, held, ("pressure",))[0])))
+        pressure = max(pressure, float(np.ptp(_known(logged, held, "pressure")[0])))
         seconds = max(seconds, float(logged.time[-1] - logged.time[0]))
-    turns = whitened.logged[0].channel("displacement") is None
-    lengths = ("deg", "rad") if turns else ("mm", "um")
-    speeds = ("deg/s", "rad/s") if turns else ("mm/s",)
-    si = dict.fromkeys(lengths, travel) | dict.fromkeys(speeds, speed)
+    si = {"mm": travel, "um": travel, "mm/s": speed}
     si |= {"kPa": pressure, "s": seconds, "ms": seconds}
     return {name: size / SI_FACTORS[name] for name, size in si.items() if size > 0.0}
 
 
-def _known(logged: Logged, held: Array, measures: tuple[str, ...]) -> tuple[Array, Array]:
+def _known(logged: Logged, held: Array, measures: str) -> tuple[Array, Array]:
     """A signal (SI) as measured, else as simulated, and the times (s) of its readings."""
-    channel = logged.channel(*measures)
-    if channel is None:
-        return np.zeros(len(logged.time)), logged.time
+    channel = logged.channel(measures)
+    assert channel is not None
     there = np.full(len(logged.time), bool(logged.measures[channel]))
     there[logged.missing[channel]] = False
     if there.sum() < LEAST_ROWS:

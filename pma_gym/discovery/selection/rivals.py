@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
 from pma_gym.discovery.fitting.fit_problem import FitProblem, Fitted
-from pma_gym.discovery.selection.candidate_fits import cost, starting_values, stripped
+from pma_gym.discovery.selection.candidate_fits import cost, starting_values
 from pma_gym.discovery.selection.stages import Stage
 
 NEAREST = 12.0
@@ -61,7 +61,6 @@ def rivals(
     if own is None:
         return []
     gain = stage.before.chi_square - own.chi_square
-    whole = _missed(problem, best, chosen, place) if stage.problem.wholes else gain
     taken = {candidate.name for candidate in chosen}
     near = sorted(
         (name for name, fit in stage.fits.items() if cost(fit) - cost(own) < CLOSE * gain),
@@ -80,19 +79,6 @@ def rivals(
         if fit is None:
             continue
         behind = cost(fit) - cost(best)
-        equal = behind < max(NEAREST, NEAREST_SHARE * whole)
+        equal = behind < max(NEAREST, NEAREST_SHARE * gain)
         ranked.append(Rival(candidate, fit, behind, equal))
     return sorted(ranked, key=lambda rival: rival.behind)
-
-
-def _missed(
-    problem: FitProblem, best: Fitted, chosen: Sequence[CandidateEffect], place: int
-) -> float:
-    """By how much chi-square of all trials rises without an effect, the others fitted again.
-
-    What an effect gained in short pieces says nothing of chi-square in the trials.
-    """
-    others = (*chosen[:place], *chosen[place + 1 :])
-    starts = {each.name: starting_values(each, best) for each in others}
-    without = problem.fit(stripped(problem, best), others, starts)
-    return 0.0 if without is None else without.chi_square - best.chi_square

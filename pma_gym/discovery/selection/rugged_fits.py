@@ -3,11 +3,9 @@
 Dry friction with a static level makes a slide stick and slip. Where a fit of such a law does not
 converge, chi-square has many minima in a narrow, bent valley, and where a search ends depends on
 where it begins. The law then enters as one number first, the simpler law within it. The whole law
-begins a little above that, at several values of what does nothing there (a Stribeck speed). Errors
-of force lead a free rig away with the square of time, so these fits are made to short pieces of its
-trials, in which chi-square is smoother; those of other rigs are eased (`FitProblem.eased_fit`). The
-best are refined without derivatives, fitted to the trials and refined there. All that explain the
-trials about as well as the best say how well the parameters are known.
+begins a little above that, at several values of what does nothing there (a Stribeck speed), and its
+fits are eased (`FitProblem.eased_fit`). The best are fitted again and refined without derivatives.
+All that explain the trials about as well as the best say how well the parameters are known.
 """
 
 from collections.abc import Iterator, Sequence
@@ -22,7 +20,6 @@ from pma_gym.discovery.fitting.covariance import covariance
 from pma_gym.discovery.fitting.derivative_free import refined
 from pma_gym.discovery.fitting.fit_problem import SURE, FitProblem, Fitted
 from pma_gym.discovery.fitting.free_parameters import values
-from pma_gym.discovery.fitting.short_pieces import in_short_pieces
 from pma_gym.discovery.selection.tied_laws import (
     IDLE_SHARE,
     Chosen,
@@ -60,7 +57,7 @@ gain for the others to be tried: where the whole law explains no more, its optim
 Assumptions; an axis of three effects ended alike with nine of them and with three."""
 
 FITTED, REFINED = 4, 2
-"""How many of the fits to short pieces are fitted to the trials, and how many are refined."""
+"""How many of the eased fits are fitted again, and how many are refined."""
 
 ALIKE = 4.0
 """How many times the least chi-square one may have that explains about as well, a residual twice as
@@ -84,22 +81,16 @@ def best_of_optima(
         problem: the trials.
         fit: a fit that did not converge; one of the starts.
         chosen: the effects in it.
-        refines: whether the best fits to the trials are refined without derivatives, which takes
-            longest; those to short pieces always are.
+        refines: whether the best fits are refined without derivatives, which takes longest.
     """
-    smooth = in_short_pieces(problem) if problem.given.rig.is_free else problem
-    begun = sorted(_fits_from_simpler_laws(smooth, fit, chosen), key=_chi_square)
-    if smooth.wholes:
-        begun[:REFINED] = [refined(smooth, each, chosen) for each in begun[:REFINED]]
-        begun.sort(key=_chi_square)
+    begun = sorted(_fits_from_simpler_laws(problem, fit, chosen), key=_chi_square)
     fits = [fit, *filter(None, (problem.fit(each.model, chosen) for each in begun[:FITTED]))]
     fits.sort(key=_chi_square)
     if refines:
         fits[:REFINED] = [refined(problem, each, chosen) for each in fits[:REFINED]]
     best = min(fits, key=_chi_square)
-    ends = [_interval(smooth, each, chosen) for each in _equals(smooth, begun, chosen)] + [
-        _interval(problem, each, chosen) for each in _equals(problem, fits, chosen)
-    ]
+    equals = [*_equals(problem, begun, chosen), *_equals(problem, fits, chosen)]
+    ends = [_interval(problem, each, chosen) for each in equals]
     return _with_spread(best, ends)
 
 
@@ -141,11 +132,7 @@ def _with_spread(best: Fitted, ends: Sequence[tuple[Array, Array]]) -> Fitted:
 
 def _interval(problem: FitProblem, fit: Fitted, chosen: Chosen) -> tuple[Array, Array]:
     """Intervals of the parameters at one optimum; the values where it does not tell them."""
-    if problem.wholes:
-        # A short piece is a cluster of few readings: its errors go by the residual alone.
-        variances = max(1.0, problem.left(fit) ** 2) * np.diag(fit.covariance)
-    else:
-        variances = np.diag(covariance(problem, fit, chosen))
+    variances = np.diag(covariance(problem, fit, chosen))
     known = np.isfinite(variances) & (variances > 0.0)
     error = SURE * np.sqrt(np.where(known, variances, 0.0))
     return fit.values - error, fit.values + error
@@ -184,10 +171,7 @@ def _fits_from_simpler_laws(problem: FitProblem, fit: Fitted, chosen: Chosen) ->
                 if number == FIRST and least > (1.0 - WORTH) * simpler.chi_square:
                     break
                 model = simpler.model.replace(start)
-                smooth = bool(problem.wholes)
-                new = (
-                    problem.fit(model, chosen) if smooth else problem.eased_fit(model, chosen, left)
-                )
+                new = problem.eased_fit(model, chosen, left)
                 if new is not None:
                     least = min(least, new.chi_square)
                     yield new
@@ -236,12 +220,11 @@ def _equals(problem: FitProblem, fits: Sequence[Fitted], chosen: Chosen) -> list
 
 
 def _chi_squares(problem: FitProblem, fit: Fitted, chosen: Chosen) -> Array:
-    """Chi-square of a fit in each whole trial."""
+    """Chi-square of a fit in each trial."""
     pieces = problem.whitened_at(fit, chosen).pieces(fit.values, np.empty(0))
     if pieces is None:
         return np.full(len(problem.trials), np.inf)
-    whole = np.asarray(problem.wholes or range(len(problem.trials)))[pieces.trial]
-    return np.bincount(whole, pieces.products[:, 0, 0]).astype(np.float64)
+    return np.bincount(pieces.trial, pieces.products[:, 0, 0]).astype(np.float64)
 
 
 def _is_by_chance(differences: Array) -> bool:

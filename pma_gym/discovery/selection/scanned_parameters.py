@@ -1,6 +1,6 @@
 """Held parameters that differ from rig to rig by powers of ten: the best of a ladder is held.
 
-How far a contact deflects before it slips decides how a joint starts to move, and chi-square is too
+How far a contact deflects before it slips decides how a rig starts to move, and chi-square is too
 rugged in it for a fit. A rolling guide deflects by a micrometre, a seal by a tenth of a millimetre.
 So the effects that have such a parameter are fitted again at a tenth and at ten times its value,
 and on in the direction in which the trials ask for it.

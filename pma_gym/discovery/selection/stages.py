@@ -28,9 +28,8 @@ LEAST_CHANGE = 0.15
 most: what is smaller is not worth a name, and no model's arithmetic is that exact."""
 
 TAKEN_UP_CHANGE = 0.05
-"""The same where a nuisance takes up most of what an effect does: a start of each piece of a trial,
-or a drift, which is as slow as creep. An assumption: friction or a spring as large as the noise
-shows so little in pieces, and creep as large as the noise changes 0.07 to 0.13 beside a drift."""
+"""The same beside a drift, which is as slow as creep and takes up most of it. An assumption: creep
+as large as the noise changes 0.07 to 0.13 beside a drift."""
 
 COARSE_CHANGE = 0.5
 """The same beside a sensor whose readings keep to coarse steps: what is lost between them is no
@@ -57,8 +56,6 @@ class Stage:
         unfitted: candidates that could not be fitted: their range, simulated, promises more than
             any fit brings, and their own fits bring far less although a refit keeps the promise.
         scanned: candidates that were fitted with held parameters at other values, by name.
-        scale: how many times as large chi-square is in the trials; not 1 where the round was of
-            short pieces of them.
     """
 
     problem: FitProblem
@@ -71,7 +68,6 @@ class Stage:
     scan: ScanStatistic = NO_EXCESS
     unfitted: tuple[str, ...] = ()
     scanned: Mapping[str, CandidateEffect] = field(default_factory=dict)
-    scale: float = 1.0
 
 
 def stage_of(
@@ -115,9 +111,7 @@ def stage_of(
     tried = Tried()
     if gate:
         beside = problem, baseline, before, chosen
-        # Short pieces of a free rig's trials lead second fits out of local minima already.
-        restarts = not astray and not (problem.given.rig.is_free and chosen)
-        tried = fits_of_candidates(*beside, scores, far, restarts, journal, progress)
+        tried = fits_of_candidates(*beside, scores, far, not astray, journal, progress)
     gains = [before.chi_square - fit.chi_square for fit in tried.fits.values()]
     if scan.excess and all(gain < least for gain in gains):
         gate, tried, scores, scan = (), replace(tried, fits={}), plainly, NO_EXCESS
@@ -184,4 +178,4 @@ def passes(problem: FitProblem, each: ScreeningScore, missing: bool = False) -> 
 def _least_change(problem: FitProblem) -> float:
     """Least rms of what an effect changes, over the noise."""
     drifts = any(each.drift for each in problem.noise)
-    return TAKEN_UP_CHANGE if problem.in_pieces or drifts else LEAST_CHANGE
+    return TAKEN_UP_CHANGE if drifts else LEAST_CHANGE

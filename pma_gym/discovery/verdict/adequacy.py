@@ -10,6 +10,7 @@ Where only those left out are, the trials may not determine the parameters: the 
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -22,7 +23,7 @@ from pma_gym.discovery.preparation.noise import (
     rest_readings,
     white_noise,
 )
-from pma_gym.discovery.verdict.flexible_regression import averaged_rows, explained, variables
+from pma_gym.discovery.verdict.flexible_regression import explained, variables
 from pma_gym.estimation.logged import Logged
 
 Array = NDArray[np.float64]
@@ -129,7 +130,6 @@ def adequacy(
     floors: Mapping[str, AcceptanceFloor],
     folds: Sequence[NDArray[np.int64]],
     seed: int,
-    answered: bool = False,
 ) -> Adequacy:
     """Judge what a model leaves of readings that it was not fitted to.
 
@@ -140,11 +140,9 @@ def adequacy(
         floors: of the signals that have one.
         folds: of each row of each trial, the part with which it was left out.
         seed: of the bootstrap.
-        answered: whether commands may answer the readings, and move what is read no sooner than
-            in the next row.
     """
-    inside = _Judge(logged, fitted, folds, seed, answered)
-    outside = None if unseen is None else _Judge(logged, unseen, folds, seed, answered)
+    inside = _Judge(logged, fitted, folds, seed)
+    outside = None if unseen is None else _Judge(logged, unseen, folds, seed)
     judged = {}
     for channel, signal in enumerate(logged[0].signals):
         if any(each.measures[channel] for each in logged):
@@ -194,7 +192,6 @@ class _Judge:
         residual: what is left of them.
         folds: the parts between which the regression predicts.
         seed: of the regression and of the bootstrap.
-        answered: whether commands may answer the readings.
     """
 
     def __init__(
@@ -203,19 +200,14 @@ class _Judge:
         residual: Residual,
         folds: Sequence[NDArray[np.int64]],
         seed: int,
-        answered: bool,
     ) -> None:
         self._logged, self._residual, self._folds, self._seed = logged, residual, folds, seed
-        self._answered = answered
-        self._given: dict[int, list[Array]] = {}
         measured = np.array([each.measures for each in logged]).any(axis=0)
         self._signals = max(int(measured.sum()), 1)
 
-    def _variables(self, behind: int) -> list[Array]:
-        if behind not in self._given:
-            pairs = zip(self._logged, self._residual.simulated, strict=True)
-            self._given[behind] = [variables(logged, held, behind) for logged, held in pairs]
-        return self._given[behind]
+    @cached_property
+    def _variables(self) -> list[Array]:
+        return list(map(variables, self._logged, self._residual.simulated))
 
     def _parts(self, channel: int) -> list[Array]:
         return [left[channel] for left in self._residual.left]
@@ -235,8 +227,8 @@ class _Judge:
             _white(noise, part, each.missing[channel])
             for part, each in zip(self._parts(channel), self._logged, strict=True)
         ]
-        given = self._variables(averaged_rows(white) if self._answered else 0)
-        share = explained(white, given, self._folds, _blocks(self._logged), self._seed)
+        blocks = _blocks(self._logged)
+        share = explained(white, self._variables, self._folds, blocks, self._seed)
         bound = np.inf
         if len(share.counts) >= LEAST_BLOCKS:
             generator = np.random.default_rng([self._seed, channel])

@@ -3,9 +3,7 @@
 What repeats with the state or the command is structure that the model lacks, whatever its law; what
 does not is noise. A ridge regression on piecewise linear functions of every variable, and on random
 functions of all together, predicts each part of the readings from the others; what it explains
-there is counted, so that a regression that only learns noise explains nothing. Where a controller
-may have answered a reading, the regression knows nothing of the time of that reading: commands
-repeat its noise, and what is simulated follows them. A force moves nothing at once.
+there is counted, so that a regression that only learns noise explains nothing.
 """
 
 from collections.abc import Sequence
@@ -67,42 +65,21 @@ class Explained:
         return float(np.quantile(means, 1.0 - chance))
 
 
-def _moving(logged: Logged, simulated: Array) -> list[Array]:
-    """The position and the pressure of a rig, as far as it has them."""
-    channels = (logged.channel("displacement", "angle"), logged.channel("pressure"))
-    return [simulated[channel] for channel in channels if channel is not None]
-
-
-def variables(logged: Logged, simulated: Array, behind: int = 0) -> Array:
+def variables(logged: Logged, simulated: Array) -> Array:
     """State, command and its history in each row of a trial, shape (rows, variables).
 
     Args:
         logged: the trial.
         simulated: what the model's sensors hold (SI), shape (signals, rows).
-        behind: how many rows before its own a row's state and commands end.
     """
     time = logged.time
-    columns = [_late(row, behind) for row in simulated]
-    # A central difference knows the next row.
-    late = behind + (behind > 0)
-    columns += [_late(np.gradient(row, time), late) for row in _moving(logged, simulated)]
-    for row in (logged.motor, logged.regulator):
-        command = _late(row, behind)
+    moving = (logged.row(simulated, each) for each in ("displacement", "pressure"))
+    columns = [*simulated, *(np.gradient(row, time) for row in moving)]
+    for command in (logged.motor, logged.regulator):
         columns += [command, np.maximum.accumulate(command), np.minimum.accumulate(command)]
         columns += [command - _smoothed(command, time, memory) for memory in MEMORIES_S]
         columns += [_since_turn(command)]
     return np.nan_to_num(np.stack(columns, axis=1))
-
-
-def _late(row: Array, rows: int) -> Array:
-    """Some rows later, and the first value before."""
-    return row[np.maximum(np.arange(len(row)) - rows, 0)]
-
-
-def averaged_rows(residuals: Sequence[Array]) -> int:
-    """How many neighbours of some residuals, NaN where there is none, the regression averages."""
-    count = sum(int(np.isfinite(each).sum()) for each in residuals)
-    return max(1, int(np.ceil(count / MOST_ROWS)))
 
 
 def explained(
@@ -122,7 +99,7 @@ def explained(
         seed: of the random functions.
     """
     rows = np.concatenate([np.isfinite(each) for each in residuals])
-    width = averaged_rows(residuals)
+    width = max(1, int(np.ceil(np.count_nonzero(rows) / MOST_ROWS)))
     target = np.concatenate(list(residuals))[rows]
     inputs = np.concatenate(list(given))[rows]
     group = np.concatenate(list(groups))[rows]

@@ -40,11 +40,9 @@ def residual_fraction(findings: Findings) -> ResidualFraction:
     before = _slow(findings, begun)
     whitened = selection.problem.whitened_residuals(selection.fit.model, selection.chosen)
     after = _slow(findings, residuals(whitened, selection.fit))
-    # What may be chance before has no share afterwards. Of a few readings no memory is known, and
-    # a slide's starts are taken from readings and carry their noise.
+    # What may be chance before has no share afterwards. Of a few readings no memory is known.
     seldom = [sparse([part[channel] for part in begun]) for channel in range(len(begun[0]))]
-    free = findings.given.rig.is_free
-    there = (before[1] > 0.0) | np.array(seldom) | free
+    there = (before[1] > 0.0) | np.array(seldom)
     shares = [
         float(now[there].sum() / then[there].sum()) if then[there].sum() > LEAST_SLOW else 0.0
         for then, now in zip(before, after, strict=True)

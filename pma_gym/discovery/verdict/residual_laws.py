@@ -53,7 +53,7 @@ class EstimatedLaw:
 
 
 def estimated_laws(problem: FitProblem, refitted: Fitted) -> list[EstimatedLaw]:
-    """Every law fitted, the one that explains most first; none for a slide, which lacks a muscle.
+    """Every law fitted, the one that explains most first; none for a rig without a muscle.
 
     They are laws of a muscle and of a drive that only pulls.
     """

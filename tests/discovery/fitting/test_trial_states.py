@@ -4,17 +4,16 @@ import subprocess
 import sys
 import tomllib
 
-import numpy as np
 import pytest
 
 from pma_gym.data.datasets.dataset import NamedTrial
 from pma_gym.data.files.trial_files import write_trial
 from pma_gym.data.trial_columns import TrialError
-from pma_gym.discovery.fitting.trial_states import _started, dump_states, misfits, read_states
+from pma_gym.discovery.fitting.trial_states import dump_states, misfits, read_states
 from pma_gym.discovery.preparation.prepared_trials import prepared
 from pma_gym.discovery.result.estimates import TrialState
 from pma_gym.discovery.workflow import refit
-from pma_gym.plant.model import dump_model, load_model, parse_model
+from pma_gym.plant.model import dump_model, parse_model
 from tests.discovery.laboratory import STATION, diagnosed, laboratory
 from tests.discovery.rig_trials import FROZEN, SLIDE_NOISE, driven_slide
 
@@ -116,14 +115,3 @@ def test_compare_prints_the_misfit(tmp_path):
     assert done.returncode == 0, done.stderr
     assert f"{diagnosis.written['load_n']:.3f}" in done.stdout and "kPa" in done.stdout
     assert done.stderr == ""
-
-
-def test_a_start_that_no_rig_has_is_taken_from_the_first_readings():
-    # Stuck in dry friction, a slide moves the same however fast it begins.
-    (trial,) = driven_slide(12.0, lanes=1, seconds=0.3, rate=100)
-    slide = load_model(FROZEN / "driven_slide" / "model.toml")
-    path = "start.velocity_mm_per_s"
-    begun = _started(slide, trial, {path: 6.4e13, "start.contraction_mm": 0.0}, [1e-5, 1e-2])
-    contraction = 1e3 * trial.measurements["contraction"]
-    fastest = np.abs(np.gradient(contraction, trial.time)).max()
-    assert abs(begun[path]) < 2.0 * fastest + 1.0

@@ -1,7 +1,6 @@
 """The contract: what a verdict needs before it denies missing structure."""
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,7 +8,6 @@ import pytest
 from pma_gym.data.datasets.dataset import Dataset, NamedTrial
 from pma_gym.data.trial import Trial
 from pma_gym.discovery.preparation.acceptance_floors import Stated, acceptance_floors, is_summary
-from pma_gym.discovery.verdict.flexible_regression import explained, variables
 from pma_gym.discovery.verdict.worsened import worsened
 from pma_gym.discovery.workflow import refit
 from pma_gym.estimation.logged import Logged
@@ -121,44 +119,6 @@ def test_of_a_summary_the_printed_standard_errors_count():
     assert is_summary([rows["load"]]) and not is_summary([trial.measurements["load"]])
     levels = floors(trials, Stated(standard_error={"load": 3.0}))
     assert (levels["load"].source, levels["load"].level) == ("standard errors", 3.0)
-
-
-# -- regression ------------------------------------------------------------------------------------
-
-
-def held_by_a_loop(behind):
-    """What is explained of white noise that a controller answers a row later: no structure."""
-    interval, given, left = 4e-3, [], []
-    for seed in range(4):
-        generator = np.random.default_rng(seed)
-        time = interval * np.arange(2500)
-        noise = 0.02 * generator.standard_normal(time.size)
-        wanted = np.sin(5.0 * time) + 0.5 * np.sin(17.0 * time)
-        q, v, read, command = np.zeros((4, time.size))
-        for k in range(1, time.size):
-            error = wanted[k - 1] - read[k - 1]
-            slope = (read[k - 1] - read[k - 2]) / interval
-            command[k] = 900.0 * error - 40.0 * slope
-            v[k] = v[k - 1] + interval * (0.5 * (command[k] + command[k - 1]) - 5.0 * v[k - 1])
-            q[k] = q[k - 1] + 0.5 * interval * (v[k] + v[k - 1])
-            read[k] = q[k] + noise[k]
-        logged = SimpleNamespace(
-            time=time,
-            motor=command,
-            regulator=np.zeros(time.size),
-            channel=lambda *names: 0 if "angle" in names else None,
-        )
-        given.append(variables(logged, q[None], behind))
-        left.append(-noise / 0.02)
-    folds = [np.full(2500, seed) for seed in range(4)]
-    blocks = [100 * seed + np.arange(2500) // 250 for seed in range(4)]
-    return explained(left, given, folds, blocks, 1).mean
-
-
-def test_noise_that_a_controller_answers_is_no_structure():
-    """Commands of the same time, and a state simulated from them, know the noise."""
-    assert held_by_a_loop(0) > 0.1
-    assert abs(held_by_a_loop(1)) < 0.02
 
 
 # -- verdicts --------------------------------------------------------------------------------------
