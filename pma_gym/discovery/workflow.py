@@ -149,7 +149,8 @@ class _Work:
                 "grey box",
                 lambda: answered(given, named, every, dataset.tolerance, self.seed, self._tell),
             )
-            return replace(said, warnings=(*words, *said.warnings), seconds=dict(self.seconds))
+            words = (*(dataset.checked or ()), *words, *said.warnings)
+            return replace(said, warnings=words, seconds=dict(self.seconds))
         given, slower = with_recorded_bandwidth(given, trials)
         words = (*(dataset.checked or ()), *words, *slower)
         journal = Journal(self.folder, trials, given, f"diagnosis 7 seed {self.seed}")

@@ -27,7 +27,7 @@ def linear():
     return box([logged(rows=300)[0]], slide(), steps=8)
 
 
-def test_what_the_plant_was_simulated_with_is_found_from_afar():
+def test_what_the_plant_was_simulated_with_is_reached_from_afar():
     dry = {"static_n": 8.0, "dynamic_n": 8.0, "stribeck_speed_mm_per_s": 5.0, "presliding_um": 10.0}
     model, time = slide(coulomb_friction=dry), np.arange(0.0, 4.0, 0.01)
     generator, trials = np.random.default_rng(2), []
@@ -43,25 +43,25 @@ def test_what_the_plant_was_simulated_with_is_found_from_afar():
     free = (MASS, VISCOUS, friction, NOISE, FORCE, replace(FORCE, name="force 1"))
     wrong = {**WRONG, "coulomb_friction.dynamic": 4.0, "force 1": 0.5}
     tied = {"coulomb_friction.static": "coulomb_friction.dynamic"}
-    made = fit(made, with_values(point(made), wrong), free, tied)
+    best = fit(made, with_values(point(made), wrong), free, tied)
     for name, truth in (("slide.mass", MASS_KG), (VISCOUS.name, DAMPING), (friction.name, 8.0)):
-        assert abs(value_of(made.point, name) - truth) < 3.0 * made.deviations[name], name
-        assert made.deviations[name] < 0.02 * truth, name
-    assert made.point.numbers["coulomb_friction.static"] == made.point.numbers[friction.name]
-    assert made.point.deviations[0] == pytest.approx(NOISES[0], rel=0.1)
+        assert abs(value_of(best.point, name) - truth) < 3.0 * best.deviations[name], name
+        assert best.deviations[name] < 0.02 * truth, name
+    assert best.point.numbers["coulomb_friction.static"] == best.point.numbers[friction.name]
+    assert best.point.deviations[0] == pytest.approx(NOISES[0], rel=0.1)
     # A latent force that is not there is not needed.
-    assert max(made.point.forces) < 0.05
+    assert max(best.point.forces) < 0.05
 
 
 def test_the_optimum_is_higher_than_the_truth_and_its_neighbours_and_about_a_parabola(linear):
-    made = fit(linear, with_values(point(linear), WRONG), ALL, {})
+    best = fit(linear, with_values(point(linear), WRONG), ALL, {})
     truth = log_likelihood(linear.innovations([point(linear)]), linear.rows)[0]
-    assert 0.0 < made.value - truth < 10.0
+    assert 0.0 < best.value - truth < 10.0
     for c in ALL:
         # One conditional standard error to either side costs a half.
-        at, error = c.of(made.point), made.information[ALL.index(c), ALL.index(c)] ** -0.5
-        beside = [made.moved(c.name, at + sign * error) for sign in (-1.0, 1.0)]
-        lost = made.value - log_likelihood(linear.innovations(beside), linear.rows)
+        at, error = c.of(best.point), best.information[ALL.index(c), ALL.index(c)] ** -0.5
+        beside = [best.moved(c.name, at + sign * error) for sign in (-1.0, 1.0)]
+        lost = best.value - log_likelihood(linear.innovations(beside), linear.rows)
         assert 0.25 < lost.mean() < 1.0, c.name
         assert np.all(lost > 0.0), c.name
 
@@ -85,10 +85,10 @@ def test_scores_of_all_blocks_sum_to_the_gradient_of_the_log_likelihood(linear):
 @pytest.mark.parametrize(("low", "high", "end"), [(0.1, 4.0, 4.0), (6.0, 9.0, 6.0)])
 def test_bounds_are_kept_and_the_others_are_the_best_beside_them(linear, low, high, end):
     start = with_values(point(linear), {"slide.mass": 0.5 * (low + high)})
-    made = fit(linear, start, [replace(MASS, lower=low, upper=high), *ALL[1:]], {})
-    assert made.point.numbers["slide.mass"] == pytest.approx(end, rel=1e-12)
+    best = fit(linear, start, [replace(MASS, lower=low, upper=high), *ALL[1:]], {})
+    assert best.point.numbers["slide.mass"] == pytest.approx(end, rel=1e-12)
     alone = fit(linear, with_values(start, {"slide.mass": end}), ALL[1:], {})
-    assert made.value == pytest.approx(alone.value, abs=0.2)
+    assert best.value == pytest.approx(alone.value, abs=0.2)
 
 
 def test_a_prior_draws_towards_the_start_by_its_width(linear):
@@ -105,9 +105,9 @@ def test_standard_errors_are_the_scatter_of_fits():
     scores = []
     for seed in range(20):
         made = box([logged(seed, rows=150)[0]], slide())
-        made = fit(made, point(made), ALL, {})
+        best = fit(made, point(made), ALL, {})
         scores.append(
-            [(value_of(made.point, n) - TRUE[n]) / made.deviations[n] for n in list(TRUE)[:3]]
+            [(value_of(best.point, n) - TRUE[n]) / best.deviations[n] for n in list(TRUE)[:3]]
         )
     scatter = np.std(scores, axis=0)
     assert np.all((scatter > 0.6) & (scatter < 1.6)), scatter

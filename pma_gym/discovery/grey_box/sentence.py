@@ -34,9 +34,10 @@ def sentence(conclusions: Conclusions) -> str:
         words = f" It {conclusions.law.words}." if conclusions.law else ""
         names = effect_names([each.name for each in conclusions.effects])
         best = f" Best candidate: {names}, which leaves {percent(conclusions.left)} of it."
+        rig, best = conclusions.selection.model.plant, best if conclusions.effects else ""
         return (
-            "Something that no effect of the catalogue carries acts on the "
-            f"{conclusions.selection.model.plant}: {left}.{words}{best if conclusions.effects else ''}"
+            f"Something that no effect of the catalogue carries acts on the {rig}: {left}."
+            f"{words}{best}"
         )
     if conclusions.verdict == "undecidable":
         return f"Too little is left to name: {left}, but {_misses(conclusions)}. {WHAT_TO_CHECK}"
@@ -58,8 +59,9 @@ def _misses(conclusions: Conclusions) -> str:
     """What predictions miss by."""
     (signal, gap), *_ = conclusions.gap.items()
     seen = " of trials that it was not fitted to" if gap.held_out else ""
+    ahead = f"{figure(conclusions.horizon, 2)} s ahead{seen}"
     return (
-        f"predictions of {signal_name(signal)} {figure(conclusions.horizon, 2)} s ahead{seen} miss by "
+        f"predictions of {signal_name(signal)} {ahead} miss by "
         f"{figure(gap.after)} {signal_unit(signal)} instead of {figure(gap.before)} (parameters "
         f"refitted {figure(gap.parameters)}, noise {figure(gap.floor)})"
     )

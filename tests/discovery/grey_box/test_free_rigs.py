@@ -105,7 +105,7 @@ NEAR = {"slide": 10.0, "joint": 0.1}
 """Presliding distance, in its file unit; the simulator's friction has none."""
 
 HELD = "the fit of held commands ends below that of lines half a row later, which it calls a delay"
-BOTH = [pytest.param("slide", marks=pytest.mark.xfail(strict=True, reason=HELD)), "joint"]
+LATE = pytest.mark.xfail(strict=True, reason=HELD)
 
 
 @cache
@@ -119,8 +119,15 @@ def inertia_of(diagnosis, plant):
     return diagnosis.parameters[INERTIA[plant]].now.value / RIGS[plant][0]
 
 
-@pytest.mark.parametrize("plant", BOTH)
-@pytest.mark.parametrize("begin", [0.0, 1.37], ids=["at rest", "in motion"])
+@pytest.mark.parametrize(
+    ("plant", "begin"),
+    [
+        pytest.param("slide", 0.0, marks=pytest.mark.campaign),
+        pytest.param("slide", 1.37, marks=LATE),
+        pytest.param("joint", 0.0, marks=LATE),
+        ("joint", 1.37),
+    ],
+)
 def test_a_rig_that_hides_nothing_lacks_no_effect_however_it_slips_or_begins(plant, begin):
     presliding = NEAR[plant] if begin else 5.0 * NEAR[plant]
     diagnosis = diagnosed(plant, presliding, begin=begin)
@@ -147,7 +154,7 @@ def test_a_drive_that_weakens_from_trial_to_trial_is_said_with_its_size():
 
 
 @pytest.mark.campaign
-@pytest.mark.parametrize("plant", BOTH)
+@pytest.mark.parametrize("plant", [pytest.param("slide", marks=LATE), "joint"])
 def test_dry_friction_that_the_model_lacks_is_named_with_its_size(plant):
     diagnosis = diagnosed(plant, None)
     sizes = {effect.name: effect.parameters for effect in diagnosis.effects}
