@@ -29,7 +29,8 @@ def sentence(conclusions: Conclusions) -> str:
         rest = f"; {own}" if own else ""
         is_rough = conclusions.share(conclusions.last) > MATERIAL
         approximate = f"; the law is approximate: {left}, is left" if is_rough else ""
-        return f"{sized_effects(conclusions.effects)} missing{rest}: {_misses(conclusions)}{approximate}."
+        named = sized_effects(conclusions.effects)
+        return f"{named} missing{rest}: {_misses(conclusions)}{approximate}."
     if conclusions.verdict == "unknown":
         words = f" It {conclusions.law.words}." if conclusions.law else ""
         names = effect_names([each.name for each in conclusions.effects])

@@ -4,6 +4,7 @@ import subprocess
 import sys
 import tomllib
 
+import numpy as np
 import pytest
 
 from pma_gym.data.datasets.dataset import NamedTrial
