@@ -54,7 +54,7 @@ def diagnosis(conclusions: Conclusions) -> Diagnosis:
     return Diagnosis(
         verdict=conclusions.verdict,
         sentence=sentence(conclusions),
-        where=conclusions.where if last.moves or conclusions.verdict == "unknown" else (),
+        where=(),
         effects=conclusions.effects if named else (),
         parameters=conclusions.parameters,
         gap=conclusions.gap,

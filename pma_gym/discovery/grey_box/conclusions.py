@@ -16,7 +16,7 @@ from pma_gym.discovery.answer.trial_records import gaps
 from pma_gym.discovery.diagnosis import Verdict
 from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
 from pma_gym.discovery.grey_box.effect_selection import EffectSelection, Hypothesis, Move, slot
-from pma_gym.discovery.grey_box.latent_law import latent_law, shares_by_trial
+from pma_gym.discovery.grey_box.latent_law import latent_law
 from pma_gym.discovery.grey_box.thresholds import (
     CONFIDENCE,
     HORIZON,
@@ -29,7 +29,7 @@ from pma_gym.discovery.grey_box.thresholds import (
     SURE,
 )
 from pma_gym.discovery.result.estimates import Estimate, Moved, NamedEffect, TrialState
-from pma_gym.discovery.result.misfit import Gap, Place, ResidualLaw, TrialRecord
+from pma_gym.discovery.result.misfit import Gap, ResidualLaw, TrialRecord
 from pma_gym.effects import CATALOGUE
 from pma_gym.estimation.innovations import TREND, TRIAL, GreyBox, counted, predictions
 from pma_gym.estimation.likelihood_fit import fit, value_of, with_tied, with_values
@@ -172,21 +172,24 @@ class Conclusions:
         )
 
     @cached_property
-    def delayed(self) -> bool:
-        """Whether a delay of the command is worth its price, and more than a clock's jitter."""
+    def delay_gain(self) -> float:
+        """Log likelihood that a delay of the command gains beyond its price; 0 for a clock's jitter."""
         last = self.last
-        if not any(c.name == "delay" for c in last.fit.coordinates):
-            return False
+        if not self.candidates or not any(c.name == "delay" for c in last.fit.coordinates):
+            return 0.0
         late, error = last.fit.point.delay, last.fit.deviations["delay"]
-        if late < max(
-            ROWS_LATE * self.selection.span / self.selection.stride / self.selection.block,
-            CONFIDENCE * error,
-        ):
-            return False
+        row = self.selection.span / self.selection.stride / self.selection.block
+        if late < max(ROWS_LATE * row, CONFIDENCE * error):
+            return 0.0
         prompt = [c for c in last.fit.coordinates if c.name != "delay"]
         made = fit(last.box, replace(last.fit.point, delay=0.0), prompt, last.fit.tied)
         price = self.selection.price(last, replace(last, fit=made)) + np.log(len(self.candidates))
-        return last.fit.value - made.value > price + LIKE
+        return max(0.0, last.fit.value - made.value - float(price))
+
+    @property
+    def delayed(self) -> bool:
+        """Whether a delay of the command is named."""
+        return self.delay_gain > LIKE
 
     @cached_property
     def verdict(self) -> Verdict:
@@ -372,7 +375,7 @@ class Conclusions:
                 NamedEffect(
                     "drive_delay",
                     self._late,
-                    1e-6,
+                    float(np.exp(-min(self.delay_gain, 600.0))),
                     {"delay_ms": Estimate(late, max(late - error, 0.0), late + error, "ms")},
                 )
             )
@@ -417,13 +420,6 @@ class Conclusions:
     def law(self) -> ResidualLaw | None:
         """What the latent force goes with."""
         return latent_law(self.smooth, self.selection.model.rig)
-
-    @cached_property
-    def where(self) -> tuple[Place, ...]:
-        """Shares of the latent force by trial."""
-        signal = self.selection.model.rig.signals[self.last.box.channels[0]]
-        names = [each.name for each in self.named]
-        return shares_by_trial(self.smooth, names, BY_QUANTITY[signal.name].name)
 
     @cached_property
     def states(self) -> dict[str, TrialState]:

@@ -1,4 +1,4 @@
-"""What the smoothed latent force goes with, and in which trials it acts."""
+"""What the smoothed latent force goes with, and in which trial it acts most."""
 
 from collections.abc import Sequence
 
@@ -7,7 +7,7 @@ import numpy as np
 from pma_gym.data.trial_columns import BY_QUANTITY
 from pma_gym.discovery.grey_box.thresholds import CONFIDENCE
 from pma_gym.discovery.report.figure_text import percent, signal_name
-from pma_gym.discovery.result.misfit import Place, ResidualLaw
+from pma_gym.discovery.result.misfit import ResidualLaw
 from pma_gym.estimation.smoother import Smoothed
 from pma_gym.plant.rigs.rig import Rig
 from pma_gym.units import SI_FACTORS
@@ -49,12 +49,8 @@ def latent_law(trials: Sequence[Smoothed], rig: Rig) -> ResidualLaw | None:
     return ResidualLaw(what, f"{name} ({column.unit})", at, mean, mean - wide, mean + wide, words)
 
 
-def shares_by_trial(
-    trials: Sequence[Smoothed], names: Sequence[str], column: str
-) -> tuple[Place, ...]:
-    """Shares of the latent force (mean square) of the trials that have most of it."""
+def largest_share(trials: Sequence[Smoothed]) -> tuple[int, float]:
+    """The trial with most of the latent force (mean square), and its share."""
     squares = np.array([float(np.sum(each.force**2)) for each in trials])
-    shares = squares / max(float(squares.sum()), 1e-300)
-    return tuple(
-        Place(column, f"trial {names[i]}", float(shares[i]), 0.0) for i in np.argsort(-shares)[:3]
-    )
+    largest = int(np.argmax(squares))
+    return largest, float(squares[largest] / max(float(squares.sum()), 1e-300))

@@ -1,6 +1,7 @@
 """The verdict of a free rig as a person would say it."""
 
 from pma_gym.discovery.grey_box.conclusions import Conclusions, path_of, quantity_of
+from pma_gym.discovery.grey_box.latent_law import largest_share
 from pma_gym.discovery.grey_box.thresholds import MATERIAL
 from pma_gym.discovery.report.effect_text import effect_names
 from pma_gym.discovery.report.figure_text import (
@@ -35,6 +36,8 @@ def sentence(conclusions: Conclusions) -> str:
         words = f" It {conclusions.law.words}." if conclusions.law else ""
         names = effect_names([each.name for each in conclusions.effects])
         best = f" Best candidate: {names}, which leaves {percent(conclusions.left)} of it."
+        number, share = largest_share(conclusions.smooth)
+        words += f" {percent(share)} of it acts in {conclusions.named[number].name}."
         rig, best = conclusions.selection.model.plant, best if conclusions.effects else ""
         return (
             f"Something that no effect of the catalogue carries acts on the {rig}: {left}."
