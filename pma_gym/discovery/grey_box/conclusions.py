@@ -173,7 +173,7 @@ class Conclusions:
 
     @cached_property
     def delay_gain(self) -> float:
-        """Log likelihood that a delay of the command gains beyond its price; 0 for a clock's jitter."""
+        """Log likelihood that a delay gains beyond its price; 0 for a jitter of the clock."""
         last = self.last
         if not self.candidates or not any(c.name == "delay" for c in last.fit.coordinates):
             return 0.0
