@@ -183,13 +183,19 @@ class FilterEquations:
     def _spread(self) -> list[Value]:
         """Covariance after the step, row by row of its lower half."""
         n, zero = len(self.mean), self.eq.graph.constant(0.0)
+        # Half of the noise before the step and half after it: of order 2, as the step is.
+        added = {
+            (i, i): 0.5 * self.drive * self.length
+            for i, state in enumerate(self.states)
+            if state.name == self.noisy
+        }
         half = []
         for row in self.transition:
             across: list[Entry] = []
             for j in range(n):
                 total: Entry = None
                 for k in range(n):
-                    total = _plus(total, _times(row[k], self.p(k, j)))
+                    total = _plus(total, _times(row[k], _plus(self.p(k, j), added.get((k, j)))))
                 across.append(total)
             half.append(across)
         out = []
@@ -197,8 +203,7 @@ class FilterEquations:
             total: Entry = None
             for k in range(n):
                 total = _plus(total, _times(half[i][k], self.transition[j][k]))
-            if i == j and self.states[i].name == self.noisy:
-                total = _plus(total, self.drive * self.length)
+            total = _plus(total, added.get((i, j)))
             out.append(zero if total is None else total)
         return out
 

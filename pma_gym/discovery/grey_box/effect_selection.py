@@ -320,6 +320,11 @@ class EffectSelection:
             if len(values) > 2 and values[-1] - values[-3] < ALIKE:
                 break
         self.linear = kinds[0]
+        if rough and len(fits) > 1:
+            best = max(fits[self.linear], key=lambda each: each.value)
+            for linear in fits:
+                fits[linear] += self._held(best, self.model, linear, self.box(self.model).rows[0].steps)
+            self.linear = max(fits, key=lambda each: max(f.value for f in fits[each]))
         forces = max(fits[self.linear], key=lambda each: each.value).point.forces
         if (
             3 <= trials <= MOST_TRIALS
@@ -661,14 +666,31 @@ class EffectSelection:
     def _readings(each: Hypothesis) -> int:
         return sum(int(trial.there.sum()) for trial in each.box.rows)
 
+    def _held(self, best: Fit, model: Model, linear: bool, steps: int) -> list[Fit]:
+        """Fits with commands held or linear between rows, from a fit that has them either way.
+
+        A held command is a line half a row later. Friction that begins to slip too late hides
+        which it is, so that both begin a second time with a tenth of the presliding distance.
+        """
+        box, point = self.box(model, linear, steps), best.point
+        row = 0.5 * self.span / self.stride / self.block * (int(linear) - int(bool(self.linear)))
+        late = any(c.name == "delay" for c in best.coordinates)
+        fits = []
+        for sooner in (1.0, 0.1) if is_rough(model) else (1.0,):
+            slip = {n: sooner * v for n, v in point.numbers.items() if n.endswith(".presliding")}
+            start = with_values(point, {**slip, "delay": max(0.0, point.delay + row * late)})
+            fits.append(fit(box, start, best.coordinates, best.tied))
+        return fits
+
     def _other_hold(self, now: Hypothesis) -> Hypothesis:
         """The same hypothesis, with commands between rows the other way if that is likelier."""
-        box = self.box(now.box.model, not self.linear, now.box.rows[0].steps)
-        made = fit(box, now.fit.point, now.fit.coordinates, now.fit.tied)
+        steps, kinds = now.box.rows[0].steps, (bool(self.linear), not self.linear)
+        fits = [(f, k) for k in kinds for f in self._held(now.fit, now.box.model, k, steps)]
+        made, linear = max(fits, key=lambda pair: pair[0].value)
         if made.value < now.fit.value + LIKE:
             return now
-        self.linear = not self.linear
-        return replace(now, box=box, fit=made)
+        self.linear = linear
+        return replace(now, box=self.box(now.box.model, linear, steps), fit=made)
 
     def _at_end(self, each: Hypothesis) -> bool:
         """Whether a parameter of one trial has gone as far as it may."""
