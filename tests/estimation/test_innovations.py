@@ -43,9 +43,6 @@ def test_without_a_latent_force_halved_steps_leave_a_quarter_of_the_error():
     assert all(3.0 < c / f < 5.0 for c, f in zip(coarse, fine, strict=True))
 
 
-@pytest.mark.xfail(
-    strict=True, reason="process noise enters after a step: variances are of order 1"
-)
 def test_with_a_latent_force_halved_steps_leave_a_quarter_of_the_error():
     trial, _ = logged(force=2.0)
     coarse, fine = (errors_of(trial, (0, 1), steps, 2.0) for steps in (8, 16))

@@ -323,7 +323,9 @@ class EffectSelection:
         if rough and len(fits) > 1:
             best = max(fits[self.linear], key=lambda each: each.value)
             for linear in fits:
-                fits[linear] += self._held(best, self.model, linear, self.box(self.model).rows[0].steps)
+                fits[linear] += self._held(
+                    best, self.model, linear, self.box(self.model).rows[0].steps
+                )
             self.linear = max(fits, key=lambda each: max(f.value for f in fits[each]))
         forces = max(fits[self.linear], key=lambda each: each.value).point.forces
         if (
