@@ -5,17 +5,16 @@ Lifetime of worker processes: they end with their parent, and survive Ctrl-C.
 
 import ctypes
 import os
-import pickle
 import signal
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, TimeoutError, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from multiprocessing import connection, get_context, parent_process
-from typing import Generic, TypeVar, cast
+from typing import cast
 
 from benchmarks.executors.executor import (
     ExecutorMissing,
@@ -23,7 +22,6 @@ from benchmarks.executors.executor import (
     ProcessDied,
     TookTooLong,
     run_packed,
-    unpacked,
 )
 
 _PR_SET_PDEATHSIG = 1
@@ -108,8 +106,6 @@ except ImportError:
         "pip install -c constraints.txt -e '.[bench]', or run one process (--jobs 1)"
     ) from None
 
-Result = TypeVar("Result")
-
 
 class LocalProcesses:
     """Runs pieces of work in processes of this machine.
@@ -160,50 +156,6 @@ class LocalProcesses:
         except (BrokenProcessPool, CancelledError):
             # A process that dies between two pieces takes the pool with it.
             return ProcessDied(None)
-
-
-class Background(Generic[Result]):
-    """Begins a piece of work in another process at once; `result` waits for it.
-
-    Where no process can be started, as in a program that does not guard its main module, the work
-    is done here when its result is asked for.
-
-    Args:
-        work: to be pickled.
-    """
-
-    def __init__(self, work: Callable[[], Result]) -> None:
-        self._work, self._pool = work, _pool(1)
-        with interrupts_blocked():
-            self._future = self._pool.schedule(run_packed, (pickle.dumps(work),))
-
-    def result(self) -> Result:
-        """Return the result of the work.
-
-        Raises:
-            Exception: whatever it raised.
-        """
-        try:
-            result = unpacked(self._future.result())
-        except (ProcessExpired, BrokenProcessPool):
-            return self._work()
-        finally:
-            self.end()
-        if isinstance(result, BaseException):
-            raise result
-        return cast(Result, result)
-
-    def end(self) -> None:
-        """End the process, whatever it is at."""
-        with interrupts_blocked():
-            self._pool.stop()
-            self._pool.join()
-
-    def __enter__(self) -> "Background[Result]":
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        self.end()
 
 
 def _pool(processes: int) -> ProcessPool:

@@ -257,9 +257,9 @@ def _results(
     failed = {score.case.name for score in scores if score.failure}
     pictured = pictured_trials(suite, run.todo, failed, executor) if pictures else {}
     pressures = suite.pressures_kpa.get("rotation", ())
-    with Bounds(suite.models[0], folder) as bounds:
-        failures, complete = bounds.compute([("rotation", p) for p in pressures], executor)
-        known = {p: bound for p in pressures if (bound := bounds.known("rotation", p)) is not None}
+    bounds = Bounds(suite.models[0], folder)
+    failures, complete = bounds.compute([("rotation", p) for p in pressures], executor)
+    known = {p: bound for p in pressures if (bound := bounds.known("rotation", p)) is not None}
     if not complete:
         raise KeyboardInterrupt
     reasons = {pressure: why for (_, pressure), why in failures.items()}
