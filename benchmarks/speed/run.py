@@ -53,7 +53,6 @@ TARGETS = (
     (SINGLE, "single/InvertedPendulum", 6.0),
     (SINGLE, "single/gem_*", 30.0),
     (SINGLE, "single/pcgym", 100.0),
-    (SINGLE, "plant/dompc", 120.0),
     (BATCH, "batch/envpool_CartPole/1024", 1.8),
     ("rollouts/own/64", "rollouts/Pendulum/8", 9.0),
     ("rollouts/own/256", "rollouts/Pendulum/8", 18.0),
