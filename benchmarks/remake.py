@@ -8,12 +8,13 @@ from pathlib import Path
 from statistics import fmean
 
 from rich.console import Console
-from rich.table import Table
 
 from benchmarks.files import RESULTS, UNREADABLE, reason, say_damaged, write_text
 from benchmarks.remake_steps import Step, command_line
 from benchmarks.runner.fingerprint import ROOT
 from benchmarks.suites.frozen import suite_names
+from pma_gym.cli.terminal import terminal_table
+from pma_gym.pages.document import TextTable
 from pma_gym.plant.model import ModelError, load_model
 
 Figures = dict[str, float]
@@ -182,11 +183,10 @@ class Remake:
     def table(self) -> None:
         """Print and write the figures that have moved since the chain began."""
         rows = compared(_read(self.folder / BEFORE), self.now())
-        table = Table("Figure", "Old", "New", "Change", title="Figures that moved")
-        for row in rows:
-            table.add_row(*row)
+        header = ("figure", "old", "new", "change")
+        table = terminal_table(TextTable("Figures that moved", header, rows))
         self.console.print(table if rows else "no figure has moved")
-        lines = ["\t".join(row) for row in (("figure", "old", "new", "change"), *rows)]
+        lines = ["\t".join(row) for row in (header, *rows)]
         write_text(self.folder / TABLE, "\n".join(lines) + "\n")
 
     def _say(self, message: str) -> None:

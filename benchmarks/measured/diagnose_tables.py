@@ -15,10 +15,10 @@ from rich.progress import Progress as Bar
 
 from benchmarks.files import write_text
 from benchmarks.measured.held_out import smooth_errors, undecidable
-from benchmarks.measured.pages import measured_page
+from benchmarks.measured.pages import measured_page, print_measured
 from benchmarks.measured.rounds import MOST_ROUNDS, Stages, rounds
 from benchmarks.measured.steps import compare_models, folds, steps
-from benchmarks.measured.tables import Measured, print_measured
+from benchmarks.measured.tables import Measured
 from benchmarks.measured.trials import measured_dataset
 from pma_gym.data.datasets.dataset import Dataset
 from pma_gym.data.files.trial_files import encode_trial

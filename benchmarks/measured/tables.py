@@ -4,13 +4,9 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from rich.console import Console
-from rich.table import Table
-
 from benchmarks.measured.held_out import Proposal, Undecidable
 from benchmarks.measured.rounds import Round
-from benchmarks.measured.steps import PHASE_NAMES, ModelComparison, Step
-from pma_gym.terminal import SafeConsole
+from benchmarks.measured.steps import ModelComparison, Step
 
 
 @dataclass(frozen=True)
@@ -53,9 +49,6 @@ COLUMNS = (
     ("return_deg", "return rotation (deg)"),
 )
 """Figures and their headings."""
-
-WIDTH = 120
-"""Columns of text where there is no terminal."""
 
 Rows = list[tuple[str, ...]]
 
@@ -178,34 +171,6 @@ NOT_DETECTABLE_HEADER = (
 )
 
 
-def print_measured(result: Measured, console: Console) -> None:
-    """All of it as tables."""
-    console = console if console.is_terminal else SafeConsole(file=console.file, width=WIDTH)
-    _print(
-        console,
-        "Diagnoses of I2 and I3",
-        ("round", "trials", "verdict", "added", "p", "explains as much"),
-        round_rows(result.rounds),
-    )
-    names = tuple(label for _, label in COLUMNS)
-    title = "Table I3 at pressures that took no part: rms error, from the commands alone"
-    _print(console, title, ("model", *names), error_rows(result))
-    for phase, label in PHASE_NAMES.items():
-        title = f"Replay of the printed voltages, {label}: mean absolute error"
-        _print(console, title, REPLAY_HEADER, replay_rows(result, phase))
-    _print(
-        console,
-        "Triangular pressure, figures 28 and 29",
-        COMPARISON_HEADER,
-        comparison_rows(result),
-    )
-    _print(
-        console, "What I2 and I3 cannot tell", NOT_DETECTABLE_HEADER, not_detectable_rows(result)
-    )
-    for line in (*experiment_text(result), *verdict_text(result)):
-        console.print(line, highlight=False)
-
-
 def verdict_text(result: Measured) -> Iterator[str]:
     """Describe the targets and the results."""
     first, last = result.steps[0], result.steps[-1]
@@ -230,12 +195,3 @@ def _label(name: str) -> str:
 
 def _figure(entry: Any, key: str) -> str:  # noqa: ANN401
     return f"{float(entry[key]):.2f}"
-
-
-def _print(console: Console, title: str, header: Sequence[str], rows: Rows) -> None:
-    table = Table(title=title, title_justify="left")
-    for number, name in enumerate(header):
-        table.add_column(name, justify="left" if number == 0 else "right")
-    for row in rows:
-        table.add_row(*row)
-    console.print(table)

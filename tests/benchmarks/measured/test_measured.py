@@ -28,10 +28,10 @@ from benchmarks.measured.held_out import (
     smooth_errors,
     worked,
 )
-from benchmarks.measured.pages import measured_page
+from benchmarks.measured.pages import measured_page, print_measured
 from benchmarks.measured.rounds import Round, Stages, rounds
 from benchmarks.measured.steps import TRIANGLES, ModelComparison, Step
-from benchmarks.measured.tables import COLUMNS, print_measured
+from benchmarks.measured.tables import COLUMNS
 from benchmarks.measured.trials import measured_dataset
 from pma_gym.data.datasets.dataset import read_dataset
 from pma_gym.data.files.trial_files import TrialWarning
