@@ -17,7 +17,7 @@ from benchmarks.files import write_text
 from benchmarks.measured.held_out import smooth_errors, undecidable
 from benchmarks.measured.pages import measured_page, print_measured
 from benchmarks.measured.rounds import MOST_ROUNDS, Stages, rounds
-from benchmarks.measured.steps import compare_models, folds, steps
+from benchmarks.measured.steps import folds, steps
 from benchmarks.measured.tables import Measured
 from benchmarks.measured.trials import measured_dataset
 from pma_gym.data.datasets.dataset import Dataset
@@ -27,9 +27,6 @@ from pma_gym.terminal import SafeConsole
 
 GIVEN = "serres2008"
 """The model to begin with."""
-
-STATION = "station"
-"""The model that `python -m benchmarks identify` made of the same tables."""
 
 DIAGNOSED_KPA = (150.0, 250.0, 300.0, 400.0, 500.0, 575.0)
 """Pressures that the diagnosis sees. Effects are chosen, and parameters fitted, without the other
@@ -121,7 +118,6 @@ def _computed(stages: Stages, jobs: int, seed: int, most: int, tell: Tell) -> Me
     final = load_model(stages.folder / f"step_{len(stepped) - 1}.toml")
     questions = partial(tell, "what is not detectable")
     not_detectable, proposals = undecidable(final, few, jobs, seed, questions)
-    models = {GIVEN: initial_model, STATION: load_model(STATION), "amended": final}
     return Measured(
         diagnoses,
         stepped,
@@ -130,7 +126,6 @@ def _computed(stages: Stages, jobs: int, seed: int, most: int, tell: Tell) -> Me
         smooth_errors(*judged),
         not_detectable,
         proposals,
-        compare_models(models, initial_model),
         0.0,
         _settings(seed, stages),
     )

@@ -6,12 +6,10 @@ from rich.console import Console
 from benchmarks.measured.steps import PHASE_NAMES
 from benchmarks.measured.tables import (
     COLUMNS,
-    COMPARISON_HEADER,
     NOT_DETECTABLE_HEADER,
     REPLAY_HEADER,
     TARGET_MM,
     Measured,
-    comparison_rows,
     error_rows,
     experiment_text,
     not_detectable_rows,
@@ -89,14 +87,6 @@ def _blocks(result: Measured) -> list[Block]:
             words=2,
         ),
         *(Paragraph(text) for text in experiment_text(result)),
-        Heading("Validation under triangular pressure (figures 28 and 29)"),
-        Paragraph(
-            "The curves are pictures; their text gives the error of the dissertation's own model "
-            "in mm and in percent of the contraction, taken here for the stroke."
-        ),
-        TextTable(
-            "Models and the printed figures", COMPARISON_HEADER, comparison_rows(result), words=2
-        ),
     ]
 
 

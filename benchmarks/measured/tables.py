@@ -6,7 +6,7 @@ from typing import Any
 
 from benchmarks.measured.held_out import Proposal, Undecidable
 from benchmarks.measured.rounds import Round
-from benchmarks.measured.steps import ModelComparison, Step
+from benchmarks.measured.steps import Step
 
 
 @dataclass(frozen=True)
@@ -21,7 +21,6 @@ class Measured:
         smooth: rms errors at unseen pressures of a smooth function of the commands, by figure.
         not_detectable: effects that I2 and I3 cannot tell beside the amended model.
         proposals: experiments that would show them.
-        comparisons: models against the validation under triangular pressure.
         seconds: how long this run took (s), without stages kept from an earlier one.
         settings: what was diagnosed, and how many stages which code made.
     """
@@ -33,7 +32,6 @@ class Measured:
     smooth: dict[str, float]
     not_detectable: list[Undecidable]
     proposals: list[Proposal]
-    comparisons: list[ModelComparison]
     seconds: float
     settings: dict[str, Any]
 
@@ -106,26 +104,6 @@ def replay_rows(result: Measured, phase: str) -> Rows:
         if entry["phase"] == phase
     ]
 
-
-def comparison_rows(result: Measured) -> Rows:
-    """Models against the validation under triangular pressure."""
-    return [
-        (
-            str(each.figure),
-            each.model,
-            f"{each.stroke_mm:.1f}",
-            f"{each.printed_mm[0]:.1f}-{each.printed_mm[1]:.1f}",
-            f"{each.apart_mm:.2f}",
-            f"{each.rmse_mm:.2f}",
-        )
-        for each in result.comparisons
-    ]
-
-
-COMPARISON_HEADER = (
-    *("figure", "model", "stroke (mm)", "measured (mm)"),
-    *("from serres2008, rms (mm)", "serres2008 printed, rms (mm)"),
-)
 
 REPLAY_HEADER = ("model", "slope", "intercept", "mean", "mean, signed", "RMSE", "trials")
 
