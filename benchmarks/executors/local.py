@@ -19,6 +19,7 @@ from typing import cast
 from benchmarks.executors.executor import (
     ExecutorMissing,
     OnEnd,
+    OtherProcesses,
     ProcessDied,
     TookTooLong,
     run_packed,
@@ -107,7 +108,7 @@ except ImportError:
     ) from None
 
 
-class LocalProcesses:
+class LocalProcesses(OtherProcesses):
     """Runs pieces of work in processes of this machine.
 
     The processes end with this one, however it ends (`lifetime.end_with_parent`).
@@ -119,15 +120,13 @@ class LocalProcesses:
         what: what the error calls a piece that took longer.
     """
 
-    isolates = True
-
     def __init__(
         self, jobs: int, limit_s: float | None = None, what: str = "a piece of work"
     ) -> None:
         self.jobs, self._limit_s, self._what = jobs, limit_s, what
 
-    def run(self, works: Mapping[int, bytes], on_end: OnEnd, alone: bool) -> None:
-        """See `Executor`."""
+    def run_packed(self, works: Mapping[int, bytes], on_end: OnEnd, alone: bool) -> None:
+        """See `OtherProcesses`."""
         if not works:
             return
         pool = _pool(1 if alone else min(self.jobs, len(works)))
