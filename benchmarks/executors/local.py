@@ -129,7 +129,9 @@ class LocalProcesses(OtherProcesses):
         """See `OtherProcesses`."""
         if not works:
             return
-        pool = _pool(1 if alone else min(self.jobs, len(works)))
+        most = 1 if alone else min(self.jobs, len(works))
+        # Spawned, not forked: the progress display has a thread, and kernels may have some.
+        pool = ProcessPool(most, initializer=_begin, context=get_context("spawn"))
         try:
             with interrupts_blocked():
                 waiting: dict[Future[bytes], int] = {
@@ -155,11 +157,6 @@ class LocalProcesses(OtherProcesses):
         except (BrokenProcessPool, CancelledError):
             # A process that dies between two pieces takes the pool with it.
             return ProcessDied(None)
-
-
-def _pool(processes: int) -> ProcessPool:
-    # Spawned, not forked: the progress display has a thread, and kernels may have some.
-    return ProcessPool(processes, initializer=_begin, context=get_context("spawn"))
 
 
 def _begin() -> None:

@@ -14,7 +14,6 @@ from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
 from rich.progress import Progress as Bar
 
 from benchmarks.files import write_text
-from benchmarks.measured.held_out import smooth_errors, undecidable
 from benchmarks.measured.pages import measured_page, print_measured
 from benchmarks.measured.rounds import MOST_ROUNDS, Stages, rounds
 from benchmarks.measured.steps import folds, steps
@@ -98,7 +97,7 @@ def _computed(stages: Stages, jobs: int, seed: int, most: int, tell: Tell) -> Me
         stages,
         seed,
         jobs,
-        lambda number: _prefixed(tell, f"round {number}: "),
+        lambda number: lambda step, done, all: tell(f"round {number}: {step}", done, all),
         most,
     )
     effects = [name for each in diagnoses for name in each.effects]
@@ -115,17 +114,11 @@ def _computed(stages: Stages, jobs: int, seed: int, most: int, tell: Tell) -> Me
     left_out = folds(
         initial_model, amended, effects, _without, FOLDS, jobs, partial(tell, "pressures left out")
     )
-    final = load_model(stages.folder / f"step_{len(stepped) - 1}.toml")
-    questions = partial(tell, "what is not detectable")
-    not_detectable, proposals = undecidable(final, few, jobs, seed, questions)
     return Measured(
         diagnoses,
         stepped,
         left_out,
         floors(),
-        smooth_errors(*judged),
-        not_detectable,
-        proposals,
         0.0,
         _settings(seed, stages),
     )
@@ -186,10 +179,6 @@ def _settings(seed: int, stages: Stages) -> dict[str, Any]:
         "loads_n": LOADS_N,
         "repeats": REPEATS,
     }
-
-
-def _prefixed(tell: Tell, prefix: str) -> Tell:
-    return lambda step, done, total: tell(prefix + step, done, total)
 
 
 @contextmanager

@@ -6,13 +6,11 @@ from rich.console import Console
 from benchmarks.measured.steps import PHASE_NAMES
 from benchmarks.measured.tables import (
     COLUMNS,
-    NOT_DETECTABLE_HEADER,
     REPLAY_HEADER,
     TARGET_MM,
     Measured,
     error_rows,
     experiment_text,
-    not_detectable_rows,
     readable,
     replay_rows,
     round_rows,
@@ -77,14 +75,6 @@ def _blocks(result: Measured) -> list[Block]:
                 replay_rows(result, phase),
             )
             for phase, label in PHASE_NAMES.items()
-        ),
-        Heading("What these tables cannot tell"),
-        TextTable(
-            "Effects that these tables would not show at their usual size, beside the amended "
-            "model",
-            NOT_DETECTABLE_HEADER,
-            not_detectable_rows(result),
-            words=2,
         ),
         *(Paragraph(text) for text in experiment_text(result)),
     ]

@@ -4,7 +4,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from benchmarks.measured.held_out import Proposal, Undecidable
 from benchmarks.measured.rounds import Round
 from benchmarks.measured.steps import Step
 
@@ -18,9 +17,6 @@ class Measured:
         steps: models with one effect more at a time.
         folds: rms errors of all effects with every pressure left out once, by figure.
         floors: scatter between repeats, by figure.
-        smooth: rms errors at unseen pressures of a smooth function of the commands, by figure.
-        not_detectable: effects that I2 and I3 cannot tell beside the amended model.
-        proposals: experiments that would show them.
         seconds: how long this run took (s), without stages kept from an earlier one.
         settings: what was diagnosed, and how many stages which code made.
     """
@@ -29,9 +25,6 @@ class Measured:
     steps: list[Step]
     folds: dict[str, float]
     floors: dict[str, float]
-    smooth: dict[str, float]
-    not_detectable: list[Undecidable]
-    proposals: list[Proposal]
     seconds: float
     settings: dict[str, Any]
 
@@ -85,8 +78,6 @@ def error_rows(result: Measured) -> Rows:
     ]
     every = tuple(f"{result.folds[key]:.2f}" for key, _ in COLUMNS)
     rows.append(("all effects, every pressure left out once", *every))
-    smooth = tuple(f"{result.smooth[key]:.2f}" for key, _ in COLUMNS)
-    rows.append(("a smooth function of the commands", *smooth))
     rows.append(("scatter of the repeats", *(f"{result.floors[key]:.2f}" for key, _ in COLUMNS)))
     return rows
 
@@ -119,34 +110,7 @@ def experiment_text(result: Measured) -> list[str]:
             if len(names) == 1:
                 why = f"see whether {names[0]} is there"
             paragraphs.append(f"Round {number} proposes, to {why}: {following['excitation']}.")
-    for number, each in enumerate(result.proposals, 1):
-        shows = ", ".join(map(readable, each.shows))
-        paragraphs.append(
-            f"Experiment {number} ({each.minutes:.2g} min): {each.excitation}. "
-            f"It would show {shows}."
-        )
     return paragraphs
-
-
-def not_detectable_rows(result: Measured) -> Rows:
-    """Effects that these tables cannot tell, and which experiment would."""
-    return [
-        (
-            readable(each.name),
-            "undecidable",
-            "at no size" if each.shows_from is None else f"{each.shows_from:.2g}",
-            "none of these" if each.experiment is None else str(each.experiment),
-        )
-        for each in sorted(result.not_detectable, key=lambda e: e.shows_from or 1e99)
-    ]
-
-
-NOT_DETECTABLE_HEADER = (
-    "effect",
-    "verdict",
-    "shows from, times its usual size",
-    "shown by experiment",
-)
 
 
 def verdict_text(result: Measured) -> Iterator[str]:
@@ -157,8 +121,7 @@ def verdict_text(result: Measured) -> Iterator[str]:
     yield (
         f"Extension at pressures that took no part: {first.unseen['extension_mm']:.2f} mm as "
         f"given, {got:.2f} mm with {len(last.effects)} effects; target {TARGET_MM:g} mm: {met}; "
-        f"a smooth function of the commands misses {result.smooth['extension_mm']:.2f} mm, repeats "
-        f"scatter by {result.floors['extension_mm']:.2f} mm."
+        f"repeats scatter by {result.floors['extension_mm']:.2f} mm."
     )
     yield (
         f"Rotation: {first.unseen['rotation_deg']:.2f} deg as given, "

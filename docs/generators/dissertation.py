@@ -68,11 +68,6 @@ def _compared() -> tuple[Comparison, ...]:
 _TIME = "since the start; required, strictly increasing"
 
 
-def _meaning(quantity: str) -> str:
-    """What a column holds, in words."""
-    return SIGNALS[quantity].meaning if quantity in SIGNALS else _TIME
-
-
 def columns() -> str:
     """The columns of a trial's file."""
     rows = [
@@ -80,7 +75,7 @@ def columns() -> str:
             code(column.name),
             column.unit,
             column.kind,
-            _meaning(column.quantity),
+            SIGNALS[column.quantity].meaning if column.quantity in SIGNALS else _TIME,
             "" if column.limits is None else f"{column.limits[0]:g} to {column.limits[1]:g}",
         ]
         for column in COLUMNS
