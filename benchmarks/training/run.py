@@ -203,8 +203,8 @@ def train(order: Order, out: Path, on_progress: OnProgress) -> Trained:
         if left > 0:
             callbacks = CallbackList([watch.average, watch])
             model.learn(left, callback=callbacks, reset_num_timesteps=False)
-        _load(watch.best, model)
-    return Trained(model, watch.curve, min(watch.curve, key=lambda point: point.mean))
+        _, until_best = _load(watch.best, model)
+    return Trained(model, watch.curve, until_best[-1])
 
 
 class _Watch(BaseCallback):
