@@ -36,7 +36,7 @@ def remake(tmp_path):
         shown = Console(file=io.StringIO(), width=100)
         return Remake(steps, tmp_path / "out", shown, machine.run)
 
-    made.ground = ground
+    made.ground = ground  # type: ignore[attr-defined]
     return made
 
 
