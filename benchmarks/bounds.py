@@ -18,7 +18,6 @@ controller that is shipped comes closer; a test holds that.
 
 import hashlib
 import json
-import os
 from collections.abc import Callable, Iterable, Iterator
 from functools import partial
 from pathlib import Path
@@ -27,7 +26,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.executors.executor import Executor, run_all
-from benchmarks.executors.local import Background
 from benchmarks.files import write_text
 from benchmarks.runner.fingerprint import code_digest_with
 from controllers.models.nominal_motion import nominal_motion
@@ -139,8 +137,8 @@ def least_return_error(model: str, task: str, pressure_kpa: float) -> float:
 class Bounds:
     """Achievable bounds of phase III on a model; each is computed once.
 
-    One takes seconds: the oracle has to drive the trial. `start` lets other processes begin, and a
-    call waits for its own. What a folder keeps counts only if it was made with this code and model.
+    One takes seconds: the oracle has to drive the trial. What a folder keeps counts only if it was
+    made with this code and model.
 
     Args:
         model: shipped name, or path of a TOML file.
@@ -155,20 +153,12 @@ class Bounds:
         self._path = None if folder is None else folder / BOUNDS
         self._key = _key(model) if self._path else ""
         self._known = self._read()
-        self._running: dict[Trial, Background[float]] = {}
-
-    def start(self, trials: Iterable[Trial]) -> None:
-        """Compute bounds that will be asked for, in a process each, as many as there are cores."""
-        for trial in trials:
-            if trial in self._known or len(self._running) >= (os.cpu_count() or 1):
-                continue
-            self._running[trial] = Background(partial(self._compute, self._model, *trial))
 
     def __call__(self, task: str, pressure_kpa: float) -> float:
         """The bound (mm or deg) of a task at a pressure (kPa)."""
         trial = task, pressure_kpa
         if trial not in self._known:
-            self._known[trial] = self._computed(trial)
+            self._known[trial] = self._compute(self._model, *trial)
             self._write()
         return self._known[trial]
 
@@ -200,10 +190,6 @@ class Bounds:
         """The bound (mm or deg) of a task at a pressure (kPa), if it is there."""
         return self._known.get((task, pressure_kpa))
 
-    def _computed(self, trial: Trial) -> float:
-        running = self._running.pop(trial, None)
-        return running.result() if running else self._compute(self._model, *trial)
-
     def _read(self) -> dict[Trial, float]:
         """What the folder keeps; nothing if it is damaged or was made with something else."""
         if self._path is None:
@@ -220,18 +206,6 @@ class Bounds:
             return
         rows = [[task, kpa, least] for (task, kpa), least in sorted(self._known.items())]
         write_text(self._path, json.dumps({"key": self._key, "bounds": rows}, indent=1) + "\n")
-
-    def close(self) -> None:
-        """End what still runs."""
-        for running in self._running.values():
-            running.end()
-        self._running.clear()
-
-    def __enter__(self) -> "Bounds":
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        self.close()
 
 
 def _key(model: str) -> str:

@@ -15,8 +15,10 @@ from rich.text import Text
 
 from benchmarks.files import csv_text, write_text
 from controllers import CONTROLLERS
+from pma_gym.cli.terminal import terminal_table
 from pma_gym.data.serres2008 import load_table
 from pma_gym.envs import PMAEnv
+from pma_gym.pages.document import TextTable
 from pma_gym.studies import VERDICTS, Comparison, compare_all
 from pma_gym.studies.recursion import PROFILES
 from pma_gym.studies.voltage_profile import voltage_profile
@@ -209,7 +211,7 @@ def run_studies(out: Path | None = None, console: Console | None = None) -> list
         for note, number in notes.items():
             console.print(f"{number}: {note}", markup=False, highlight=False)
         console.print()
-    console.print(counts_table(rows))
+    console.print(terminal_table(counts_table(rows)))
     if out is not None:
         write_csv(out, COLUMNS, [_cells(row) for row in rows])
         console.print(f"{len(rows)} comparisons in {out}")
@@ -253,17 +255,11 @@ def study_table(study: str, rows: Sequence[Comparison], notes: Mapping[str, int]
     return table
 
 
-def counts_table(rows: Sequence[Comparison]) -> Table:
+def counts_table(rows: Sequence[Comparison]) -> TextTable:
     """Count figures of each study that are equal, rounded and misprinted."""
-    table = Table(title="All studies", title_justify="left")
-    table.add_column("study")
-    for verdict in VERDICTS:
-        table.add_column(verdict, justify="right")
-    for study, group in _by_study(rows).items():
-        table.add_row(study, *_counts(group))
-    table.add_section()
-    table.add_row("all", *_counts(rows))
-    return table
+    studies = [*_by_study(rows).items(), ("all", rows)]
+    cells = [[study, *_counts(group)] for study, group in studies]
+    return TextTable("All studies", ("Study", *VERDICTS), cells)
 
 
 def _counts(rows: Sequence[Comparison]) -> list[str]:

@@ -34,7 +34,6 @@ _REPLAY = "serres_replay"
 _SUMMARISED = (_REPLAY, "pid", "ppo")
 """Controllers of the README's table."""
 _PARTS, _PART_NAMES = ("rmse", "line_error", "scatter"), ("RMSE", "line part", "scatter")
-_REPLAY_COLUMNS = ("slope", "intercept", "mean", "rmse", "line_error", "scatter")
 
 
 class RunError(ValueError):
@@ -75,57 +74,6 @@ def setting(run: Run) -> str:
         f"Suite `{suite['name']}` version {suite['version']}, seed {suite['seed']}, on the model "
         f"`{suite['models'][0]}`: control at {suite['control_rate_hz']:g} Hz {noise} sensor noise, "
         "scored on the true motion at 384 Hz."
-    )
-
-
-def speed(run: Run) -> str:
-    """Describe the duration of the run."""
-    info = run["run"]
-    before = info.get("cases_reused", 0)
-    reused = f" ({before} of the cases were done before)" if before else ""
-    return (
-        f"This run: {len(run['scores'])} cases and the bounds in {info['wall_time_s']:.0f} s with "
-        f"{info['jobs']} processes{reused}; "
-        f"{info['environment_steps_per_second']:.0f} environment steps a second in one process."
-    )
-
-
-def targets(run: Run) -> str:
-    """Targets, what was got, met or missed."""
-    rows = [
-        [
-            check["what"],
-            f"{'<' if check['strict'] else '≤'} {check['limit']:g} {check['unit']}",
-            "" if check["got"] is None else f"{check['got']:.3g} {check['unit']}",
-            check["verdict"],
-        ]
-        for check in run["targets"]
-    ]
-    return _table(["What", "Target", "This run", "Verdict"], rows, words=1)
-
-
-def replay(run: Run) -> str:
-    """Simulated less measured for the replay: mean and mean absolute errors by phase."""
-    rows = []
-    for task, phases in PHASES.items():
-        for phase in phases:
-            errors = [e for e in run["replay_errors"] if (e["task"], e["phase"]) == (task, phase)]
-            name = task if task == phase else f"{task}, phase {phase}"
-            values = [[error[column] for error in errors] for column in _REPLAY_COLUMNS]
-            cells = [f"{fmean(v):+.2f} ({fmean(map(abs, v)):.2f})" for v in values]
-            rows.append([f"{name} ({UNITS[task]})", *cells])
-    return _table(
-        [
-            "Simulated less measured",
-            "slope (per s)",
-            "intercept",
-            "mean position",
-            "RMSE",
-            "line part",
-            "scatter",
-        ],
-        rows,
-        words=1,
     )
 
 
@@ -177,14 +125,6 @@ def reading(run: Run) -> str:
     )
 
 
-def bound(run: Run) -> str:
-    """Least RMSE in phase III of rotation that any controller reaches, by pressure."""
-    bounds = run["achievable_rmse_phase_iii_deg"]
-    cells = [f"{value:.3f}" for value in bounds.values()]
-    header = ["Pressure (kPa)", *bounds]
-    return _table(header, [["Achievable RMSE, phase III (deg)", *cells]], words=1)
-
-
 FIGURES: dict[str, Callable[[Run], str]] = {
     function.__name__: function
     for function in (
@@ -192,12 +132,8 @@ FIGURES: dict[str, Callable[[Run], str]] = {
         rotation,
         summary,
         setting,
-        speed,
-        targets,
-        replay,
         parts,
         reading,
-        bound,
     )
 }
 """Blocks by name."""

@@ -42,8 +42,7 @@ def targets(
         checks = targets_again(frozen, folder, executor_named(LOCAL, 2))
         table = target_table(checks, frozen.models[0])
     else:
-        with Bounds(frozen.model, folder) as bounds:
-            checks = read_leaderboard(frozen, folder, bounds).verdicts
+        checks = read_leaderboard(frozen, folder, Bounds(frozen.model, folder)).verdicts
         table = verdict_table(checks)
     documents = [check.document() for check in checks]
     if as_json:

@@ -45,17 +45,12 @@ def remake(
     steps: Annotated[
         bool, typer.Option("--list", help="List the steps and what is left, and stop.")
     ] = False,
-    table: Annotated[
-        bool, typer.Option("--table", help="Show figures that moved since it began, and stop.")
-    ] = False,
     jobs: Jobs = 2,
-    out: Annotated[
-        Path, typer.Option(help="Folder of what is done, old figures, and the table.")
-    ] = RESULTS / "remake",
+    out: Annotated[Path, typer.Option(help="Folder of what is done.")] = RESULTS / "remake",
 ) -> None:
     """Make all anew that depends on the station: model, gains, designs, policies, scores, tables.
 
-    It goes on where it stopped, and ends with a table of old and new figures.
+    It goes on where it stopped; `git diff` then shows which figures have moved.
     """
     from benchmarks.remake import Remake
     from benchmarks.remake_steps import chain
@@ -78,9 +73,6 @@ def remake(
         for step in every:
             said = "left" if step.name in left else "done" if step in chosen else "left out"
             print(f"{step.name:10} {said:9} {step.hours:5.1f} h  {step.makes}")
-        return
-    if table:
-        job.table()
         return
     raise typer.Exit(0 if job.go() else 1)
 

@@ -9,9 +9,6 @@ from pathlib import Path
 from statistics import median
 
 from rich.console import Console
-from rich.markup import escape
-from rich.progress import Progress
-from rich.table import Table
 
 from benchmarks.executors.executor import ProcessDied, TookTooLong, run_all
 from benchmarks.executors.local import LocalProcesses
@@ -22,18 +19,16 @@ from benchmarks.runner.case import BY_LIMIT, Row
 from benchmarks.runner.controller_spec import ControllerError, ControllerSpec
 from benchmarks.runner.execution import (
     PendingCases,
-    compile_kernels,
-    execute,
     identity,
-    pending_cases,
     row_identity,
 )
 from benchmarks.runner.isolated_controller import MAKE_S, LateError, probe
-from benchmarks.runner.provenance import check_folder, run_info, write_run
-from benchmarks.runner.run import plain_progress
+from benchmarks.runner.run import EnoughError, run_missing
 from benchmarks.suites.reproduction import ReproductionSuite
 from benchmarks.suites.suite import Entry, FrozenSuite, SuiteError
 from controllers import CONTROLLERS
+from pma_gym.cli.terminal import terminal_table
+from pma_gym.pages.document import TextTable
 
 SCORES = "scores.csv"
 
@@ -77,21 +72,16 @@ def print_scores(
 ) -> None:
     """Median RMSE of every controller, and why cases failed."""
     units = list(dict.fromkeys(row["unit"] for row in rows if not row["failure"]))
-    table = Table("controller", title=f"Suite {todo.suite.name}", title_justify="left")
-    for heading in ("cases", "failed", *(f"median RMSE ({unit})" for unit in units), "act (us)"):
-        table.add_column(heading, justify="right")
+    cells = []
     for entry in entries:
         mine = [row for row in rows if row["controller"] == entry.spec.name]
         done = [row for row in mine if not row["failure"]]
         errors = [[row["rmse"] for row in done if row["unit"] == unit] for unit in units]
-        table.add_row(
-            entry.spec.label,
-            str(len(mine)),
-            str(len(mine) - len(done)),
-            *(_figure(values) for values in errors),
-            _figure([row["act_us"] for row in done]),
-        )
-    console.print(table)
+        figures = map(_figure, [*errors, [row["act_us"] for row in done]])
+        cells.append([entry.spec.label, str(len(mine)), str(len(mine) - len(done)), *figures])
+    medians = (f"median RMSE ({unit})" for unit in units)
+    header = ["controller", "cases", "failed", *medians, "act (us)"]
+    console.print(terminal_table(TextTable(f"Suite {todo.suite.name}", header, cells)))
     print_clipping(rows, console)
     print_failures(rows, console)
 
@@ -153,10 +143,6 @@ FAILED, INTERRUPTED = 1, 130
 """Exit codes."""
 
 
-class _EnoughError(Exception):
-    """The rest of a suite is not worth running."""
-
-
 def own_controller(text: str) -> ControllerSpec:
     """The controller of `path/to/file.py:ClassName`, tried in a process of its own.
 
@@ -209,75 +195,33 @@ def run_add(
                 f"suite {suite.name} has a report of its own and no leaderboard; run "
                 f"python -m benchmarks --controllers {spec.source}"
             )
-        out = results / suite.name
-        check_folder(suite, out)
-        todo = pending_cases(suite, [suite.entry(spec)], out)
-        rows = list(todo.known.values())
-        console.print(
-            f"{suite.name} version {suite.version}: {len(todo.cases)} cases of "
-            f"{spec.label}, {len(rows)} of them done before",
-            highlight=False,
-        )
-        info = run_info(todo, [suite.entry(spec)], out, jobs)
-        write_run(out, info, complete=False)
-        complete = _run(todo, out, jobs, rows, console)
-        write_run(out, info, complete=bool(complete))
-        failed |= any(row["failure"] for row in rows)
-        print_clipping(rows, console)
-        print_failures(rows, console)
-        if complete is None:
-            console.print(
-                f"Interrupted: {len(rows)} of {len(todo.cases)} cases are done and "
-                "stay; the same command goes on from there.",
-                highlight=False,
-            )
-            return INTERRUPTED
-        if complete:
+        out, troubles = results / suite.name, list[Row]()
+
+        def on_row(row: Row, troubles: list[Row] = troubles) -> None:
+            if row["failure"] and BY_LIMIT not in row["failure"]:
+                troubles.append(row)
+            if len(troubles) >= ENOUGH:
+                raise EnoughError
+
+        places, entries = LocalProcesses(jobs), [suite.entry(spec)]
+        run = run_missing(suite, entries, out, places, console, "", on_row, untrusted=True)
+        if run.complete:
+            run.finish(out)
+        failed |= any(row["failure"] for row in run.rows)
+        print_clipping(run.rows, console)
+        print_failures(run.rows, console)
+        if run.complete:
             _say_ranks(spec, suite, out, console)
-    return FAILED if failed else 0
-
-
-def _run(
-    todo: PendingCases, out: Path, jobs: int, rows: list[Row], console: Console
-) -> bool | None:
-    """Run what is missing, adding to the rows; whether it was worth it to the end.
-
-    Returns:
-        True if all is done, False if it failed too often, None if Ctrl-C ended it.
-    """
-    if not todo.missing:
-        return True
-    troubles = 0
-    with console.status("drawing the stations, compiling their equations"):
-        compile_kernels(todo.suite)
-    with (
-        Progress(console=console, transient=True) as progress,
-        plain_progress(console, len(rows), len(todo.cases)) as say,
-    ):
-        bar = progress.add_task(escape(todo.suite.name), total=len(todo.cases), completed=len(rows))
-
-        def on_done(row: Row) -> None:
-            nonlocal troubles
-            rows.append(row)
-            progress.update(bar, advance=1)
-            say(len(rows))
-            troubles += bool(row["failure"]) and BY_LIMIT not in row["failure"]
-            if troubles >= ENOUGH:
-                raise _EnoughError
-
-        try:
-            done = execute(todo, LocalProcesses(jobs), out, on_done, untrusted=True)
-        except _EnoughError:
-            (spec,) = {case.spec for case in todo.cases}
-            suite = todo.suite
+        elif len(troubles) < ENOUGH:
+            return INTERRUPTED
+        else:
             console.print(
-                f"  {ENOUGH} cases failed: the other {len(todo.cases) - len(rows)} are "
+                f"  {ENOUGH} cases failed: the other {len(run.todo.cases) - len(run.rows)} are "
                 "not run; correct it and run the same command again, or take its rows out: "
                 f"{remove_command(spec.name, suite, out)}",
                 highlight=False,
             )
-            return False
-    return True if done else None
+    return FAILED if failed else 0
 
 
 def _say_ranks(spec: ControllerSpec, suite: FrozenSuite, out: Path, console: Console) -> None:

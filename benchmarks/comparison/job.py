@@ -11,7 +11,6 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from rich.console import Console
-from rich.table import Table
 
 from benchmarks.comparison.add import print_scores, write_scores
 from benchmarks.executors.executor import Executor
@@ -23,6 +22,8 @@ from benchmarks.runner.provenance import read_run, write_run
 from benchmarks.runner.run import FAILED, INTERRUPTED, run_missing
 from benchmarks.suites.frozen import frozen_suite, suite_names
 from benchmarks.suites.suite import Entry, FrozenSuite, SuiteError
+from pma_gym.cli.terminal import terminal_table
+from pma_gym.pages.document import TextTable
 
 
 def chosen(suite: FrozenSuite, controllers: str) -> list[Entry]:
@@ -85,18 +86,15 @@ def run_comparison(
 
 def print_suites(console: Console) -> None:
     """A table of the suites and of who is compared on them."""
-    table = Table("suite", "version", "stations", "episodes", "cases", "tasks")
     frozen = [frozen_suite(name) for name in suite_names()]
-    for suite in frozen:
-        table.add_row(
-            suite.name,
-            str(suite.version),
-            str(len(suite.stations)),
-            str(len(suite.episodes)),
-            str(len(cases(suite, suite.entries))),
-            str(len(suite.tasks)),
-        )
-    console.print(table)
+    rows = [
+        [suite.name]
+        + [str(suite.version), str(len(suite.stations)), str(len(suite.episodes))]
+        + [str(len(cases(suite, suite.entries))), str(len(suite.tasks))]
+        for suite in frozen
+    ]
+    header = ("suite", "version", "stations", "episodes", "cases", "tasks")
+    console.print(terminal_table(TextTable("", header, rows)))
     for suite in frozen:
         names = ", ".join(entry.spec.name for entry in suite.entries)
         console.print(f"{suite.name}: {suite.title} ({_control(suite)})", highlight=False)

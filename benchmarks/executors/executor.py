@@ -111,19 +111,13 @@ class Executor(Protocol):
 
     Attributes:
         jobs: how many at a time.
-        isolates: whether a piece that ends its process leaves this process alone.
     """
 
     jobs: int
-    isolates: bool
 
-    def run(self, works: Mapping[int, bytes], on_end: OnEnd, alone: bool) -> None:
-        """Run packed pieces of work (see `work.run_packed`).
+    def run(self, works: Sequence[Work], on_done: OnDone, untrusted: bool) -> None:
+        """Run pieces of work, see `run_all`.
 
-        Args:
-            works: the pieces by number.
-            on_end: called in this process and thread as they end, in any order.
-            alone: one at a time.
         Raises:
             KeyboardInterrupt: after the pieces in progress were ended.
         """
@@ -131,14 +125,60 @@ class Executor(Protocol):
 
 
 class ThisProcess:
-    """Runs one piece after another in this process."""
+    """Runs one piece after another in this process; one that ends its process ends this one.
 
-    jobs, isolates = 1, False
+    Nothing is packed: what cannot be pickled runs too, and Ctrl-C is no result.
+    """
 
-    def run(self, works: Mapping[int, bytes], on_end: OnEnd, alone: bool = True) -> None:
-        """See `Executor`; a piece that ends its process ends this one."""
-        for index, work in works.items():
-            on_end(index, run_packed(work))
+    jobs = 1
+
+    def run(self, works: Sequence[Work], on_done: OnDone, untrusted: bool = False) -> None:
+        """See `Executor`."""
+        for index, work in enumerate(works):
+            try:
+                result = work()
+            except (Exception, SystemExit) as error:
+                result = error
+            on_done(index, result)
+
+
+class OtherProcesses:
+    """Runs pieces in other processes: a piece that ends its process leaves this process alone."""
+
+    def run_packed(self, works: Mapping[int, bytes], on_end: OnEnd, alone: bool) -> None:
+        """Run packed pieces of work (see `run_packed`).
+
+        Args:
+            works: the pieces by number.
+            on_end: called in this process and thread as they end, in any order.
+            alone: one at a time.
+        """
+        raise NotImplementedError
+
+    def run(self, works: Sequence[Work], on_done: OnDone, untrusted: bool) -> None:
+        """See `Executor`."""
+        packed: dict[int, bytes] = {}
+        for index, work in enumerate(works):
+            try:
+                packed[index] = pickle.dumps(work)
+            except Exception as error:
+                on_done(index, error)
+        died: list[int] = []
+
+        def first(index: int, end: bytes | ProcessDied | TookTooLong) -> None:
+            if isinstance(end, ProcessDied) and not untrusted:
+                died.append(index)
+            else:
+                on_done(index, unpacked(end) if isinstance(end, bytes) else end)
+
+        def second(index: int, end: bytes | ProcessDied | TookTooLong) -> None:
+            if isinstance(end, ProcessDied):
+                end = ProcessDied(end.exit_code, again=True)
+            on_done(index, unpacked(end) if isinstance(end, bytes) else end)
+
+        self.run_packed(packed, first, alone=False)
+        # Alone it has all of the memory, if that was the reason.
+        self.run_packed({index: packed[index] for index in sorted(died)}, second, alone=True)
 
 
 def run_all(
@@ -160,10 +200,7 @@ def run_all(
         Whether all of it was run: Ctrl-C ends the run at once, with the pieces in progress.
     """
     try:
-        if executor.isolates:
-            _run_elsewhere(works, executor, on_done, untrusted)
-        else:
-            _run_here(works, on_done)
+        executor.run(works, on_done, untrusted)
     except KeyboardInterrupt:
         return False
     return True
@@ -186,40 +223,3 @@ def run_or_raise(
 
     if not run_all(works, executor, keep):
         raise KeyboardInterrupt
-
-
-def _run_here(works: Sequence[Work], on_done: OnDone) -> None:
-    """Without packing: what cannot be pickled runs too, and Ctrl-C is no result."""
-    for index, work in enumerate(works):
-        try:
-            result = work()
-        except (Exception, SystemExit) as error:
-            result = error
-        on_done(index, result)
-
-
-def _run_elsewhere(
-    works: Sequence[Work], executor: Executor, on_done: OnDone, untrusted: bool
-) -> None:
-    packed: dict[int, bytes] = {}
-    for index, work in enumerate(works):
-        try:
-            packed[index] = pickle.dumps(work)
-        except Exception as error:
-            on_done(index, error)
-    died: list[int] = []
-
-    def first(index: int, end: bytes | ProcessDied | TookTooLong) -> None:
-        if isinstance(end, ProcessDied) and not untrusted:
-            died.append(index)
-        else:
-            on_done(index, unpacked(end) if isinstance(end, bytes) else end)
-
-    def second(index: int, end: bytes | ProcessDied | TookTooLong) -> None:
-        if isinstance(end, ProcessDied):
-            end = ProcessDied(end.exit_code, again=True)
-        on_done(index, unpacked(end) if isinstance(end, bytes) else end)
-
-    executor.run(packed, first, alone=False)
-    # Alone it has all of the memory, if that was the reason.
-    executor.run({index: packed[index] for index in sorted(died)}, second, alone=True)

@@ -5,25 +5,24 @@ Lifetime of worker processes: they end with their parent, and survive Ctrl-C.
 
 import ctypes
 import os
-import pickle
 import signal
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, TimeoutError, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from multiprocessing import connection, get_context, parent_process
-from typing import Generic, TypeVar, cast
+from typing import cast
 
 from benchmarks.executors.executor import (
     ExecutorMissing,
     OnEnd,
+    OtherProcesses,
     ProcessDied,
     TookTooLong,
     run_packed,
-    unpacked,
 )
 
 _PR_SET_PDEATHSIG = 1
@@ -108,10 +107,8 @@ except ImportError:
         "pip install -c constraints.txt -e '.[bench]', or run one process (--jobs 1)"
     ) from None
 
-Result = TypeVar("Result")
 
-
-class LocalProcesses:
+class LocalProcesses(OtherProcesses):
     """Runs pieces of work in processes of this machine.
 
     The processes end with this one, however it ends (`lifetime.end_with_parent`).
@@ -123,18 +120,18 @@ class LocalProcesses:
         what: what the error calls a piece that took longer.
     """
 
-    isolates = True
-
     def __init__(
         self, jobs: int, limit_s: float | None = None, what: str = "a piece of work"
     ) -> None:
         self.jobs, self._limit_s, self._what = jobs, limit_s, what
 
-    def run(self, works: Mapping[int, bytes], on_end: OnEnd, alone: bool) -> None:
-        """See `Executor`."""
+    def run_packed(self, works: Mapping[int, bytes], on_end: OnEnd, alone: bool) -> None:
+        """See `OtherProcesses`."""
         if not works:
             return
-        pool = _pool(1 if alone else min(self.jobs, len(works)))
+        most = 1 if alone else min(self.jobs, len(works))
+        # Spawned, not forked: the progress display has a thread, and kernels may have some.
+        pool = ProcessPool(most, initializer=_begin, context=get_context("spawn"))
         try:
             with interrupts_blocked():
                 waiting: dict[Future[bytes], int] = {
@@ -160,55 +157,6 @@ class LocalProcesses:
         except (BrokenProcessPool, CancelledError):
             # A process that dies between two pieces takes the pool with it.
             return ProcessDied(None)
-
-
-class Background(Generic[Result]):
-    """Begins a piece of work in another process at once; `result` waits for it.
-
-    Where no process can be started, as in a program that does not guard its main module, the work
-    is done here when its result is asked for.
-
-    Args:
-        work: to be pickled.
-    """
-
-    def __init__(self, work: Callable[[], Result]) -> None:
-        self._work, self._pool = work, _pool(1)
-        with interrupts_blocked():
-            self._future = self._pool.schedule(run_packed, (pickle.dumps(work),))
-
-    def result(self) -> Result:
-        """Return the result of the work.
-
-        Raises:
-            Exception: whatever it raised.
-        """
-        try:
-            result = unpacked(self._future.result())
-        except (ProcessExpired, BrokenProcessPool):
-            return self._work()
-        finally:
-            self.end()
-        if isinstance(result, BaseException):
-            raise result
-        return cast(Result, result)
-
-    def end(self) -> None:
-        """End the process, whatever it is at."""
-        with interrupts_blocked():
-            self._pool.stop()
-            self._pool.join()
-
-    def __enter__(self) -> "Background[Result]":
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        self.end()
-
-
-def _pool(processes: int) -> ProcessPool:
-    # Spawned, not forked: the progress display has a thread, and kernels may have some.
-    return ProcessPool(processes, initializer=_begin, context=get_context("spawn"))
 
 
 def _begin() -> None:

@@ -10,7 +10,13 @@ from collections.abc import Mapping
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from typing import TYPE_CHECKING, Any
 
-from benchmarks.executors.executor import ExecutorMissing, OnEnd, ProcessDied, run_packed
+from benchmarks.executors.executor import (
+    ExecutorMissing,
+    OnEnd,
+    OtherProcesses,
+    ProcessDied,
+    run_packed,
+)
 from benchmarks.executors.local import end_with
 
 if TYPE_CHECKING:
@@ -34,7 +40,7 @@ for pid in map(int, sys.argv[1:]):
 """Program that waits for the end of its standard input, then ends the processes that it names."""
 
 
-class RayCluster:
+class RayCluster(OtherProcesses):
     """Runs pieces of work on Ray, one CPU each.
 
     Every machine of a cluster needs this version of the package and the files that pieces name.
@@ -45,8 +51,6 @@ class RayCluster:
     Raises:
         ExecutorMissing: Ray is not installed.
     """
-
-    isolates = True
 
     def __init__(self, jobs: int) -> None:
         self.jobs = jobs
@@ -60,8 +64,8 @@ class RayCluster:
             ) from None
         self._ray = ray
 
-    def run(self, works: Mapping[int, bytes], on_end: OnEnd, alone: bool) -> None:
-        """See `Executor`.
+    def run_packed(self, works: Mapping[int, bytes], on_end: OnEnd, alone: bool) -> None:
+        """See `OtherProcesses`.
 
         Raises:
             ConnectionError: the cluster is lost.

@@ -18,9 +18,9 @@ from benchmarks.exercise.tables import (
     knee_table,
     makers_table,
     range_table,
-    terminal_table,
 )
 from benchmarks.files import write_bytes, write_text
+from pma_gym.cli.terminal import terminal_table
 from pma_gym.pages.document import (
     Block,
     Callout,

@@ -8,8 +8,9 @@ from rich.progress import Progress
 
 from benchmarks.executors.executor import Executor
 from benchmarks.exercise.safety_episodes import Safety, Tally, measure
-from benchmarks.exercise.tables import NONE, terminal_table
+from benchmarks.exercise.tables import NONE
 from benchmarks.files import write_text
+from pma_gym.cli.terminal import terminal_table
 from pma_gym.document_shape import ListOf, Whole, check_shape, shape_of
 from pma_gym.documents import read_json
 from pma_gym.pages.document import TextTable, to_markdown

@@ -8,7 +8,6 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import LogLocator, NullFormatter
-from rich.table import Table
 
 from benchmarks.exercise.profile import Answer
 from pma_gym.pages.document import TextTable
@@ -33,8 +32,6 @@ from pma_gym.units import SI_FACTORS
 
 _DEG = SI_FACTORS["deg"]
 NONE = "—"
-_SHORT = 18
-"""Characters up to which a cell of the terminal stays on one line."""
 
 SCHEDULED_DEG = (0, 45, 90)
 """Angles at which the moments of a cable set once are shown."""
@@ -148,18 +145,6 @@ def makers_table(model: Model) -> TextTable:
         rows,
         words=2,
     )
-
-
-def terminal_table(table: TextTable) -> Table:
-    """A table of the report for the terminal, as narrow as 80 columns."""
-    shown = Table(title=table.title, title_justify="left", box=None, padding=(0, 1, 0, 0))
-    for column, name in enumerate(table.header):
-        justify = "left" if column < table.words else "right"
-        short = max(len(row[column]) for row in table.rows) <= _SHORT
-        shown.add_column(name.replace(" | ", "\n"), justify=justify, no_wrap=short)
-    for row in table.rows:
-        shown.add_row(*row)
-    return shown
 
 
 _COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")

@@ -9,7 +9,6 @@ from typing import NamedTuple
 import numpy as np
 from rich.console import Console
 from rich.progress import Progress
-from rich.table import Table
 
 from benchmarks.executors.choice import local
 from benchmarks.executors.executor import run_or_raise
@@ -19,6 +18,8 @@ from benchmarks.identification.creep import STUDENT_10, CreepFold, decided, load
 from benchmarks.identification.statics import StationLimits, station_limits
 from benchmarks.identification.station import fitted_parameters, identify, leave_out
 from benchmarks.identification.transients import PressureSteps, pressure_steps
+from pma_gym.cli.terminal import terminal_table
+from pma_gym.pages.document import TextTable
 from pma_gym.plant.model import Model, dump_model
 from pma_gym.plant.parameter_rows import Note
 from pma_gym.terminal import SafeConsole
@@ -180,30 +181,30 @@ def _header(figures: dict[str, float], remarks: list[str]) -> str:
 def _print(
     console: Console, model: Model, folds: list[station.LeftOut], remarks: list[str]
 ) -> None:
-    table = Table("parameter", "value", "low", "high", title="Identified station")
+    rows = []
     for path, note in model.notes.items():
         if note.low is not None:
             effect, _, file_key = path.partition(".")
             value = model.values_in_files(effect)[file_key]
             assert isinstance(value, float) and note.high is not None
             unit = borne_unit(0.5 * (note.high - note.low) / STUDENT_10)
-            table.add_row(path, *(borne(each, unit) for each in (value, note.low, note.high)))
-    console.print(table)
-    table = Table(
-        "left-out pressure (kPa)",
-        "extension RMSE (mm)",
-        "rotation RMSE (deg)",
-        "no-load contraction (mm)",
-        title="Predicted less measured, table I3",
+            rows.append([path, *(borne(each, unit) for each in (value, note.low, note.high))])
+    parameters = TextTable("Identified station", ("parameter", "value", "low", "high"), rows)
+    header = ("left-out pressure (kPa)", "extension RMSE (mm)", "rotation RMSE (deg)")
+    left_out = TextTable(
+        "Predicted less measured, table I3",
+        (*header, "no-load contraction (mm)"),
+        [
+            [
+                f"{fold.pressure / 1e3:.0f}",
+                f"{station.rms(fold.extension):.2f}",
+                f"{station.rms(fold.rotation):.2f}",
+                f"{fold.no_load:+.2f}",
+            ]
+            for fold in folds
+        ],
     )
-    for fold in folds:
-        table.add_row(
-            f"{fold.pressure / 1e3:.0f}",
-            f"{station.rms(fold.extension):.2f}",
-            f"{station.rms(fold.rotation):.2f}",
-            f"{fold.no_load:+.2f}",
-        )
-    console.print(table)
+    console.print(terminal_table(parameters), terminal_table(left_out))
     for name, figure in station.figures(folds).items():
         target = station.TARGETS[name]
         verdict = "met" if figure <= target else "MISSED"

@@ -14,11 +14,10 @@ from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
 from rich.progress import Progress as Bar
 
 from benchmarks.files import write_text
-from benchmarks.measured.held_out import smooth_errors, undecidable
-from benchmarks.measured.pages import measured_page
+from benchmarks.measured.pages import measured_page, print_measured
 from benchmarks.measured.rounds import MOST_ROUNDS, Stages, rounds
-from benchmarks.measured.steps import compare_models, folds, steps
-from benchmarks.measured.tables import Measured, print_measured
+from benchmarks.measured.steps import folds, steps
+from benchmarks.measured.tables import Measured
 from benchmarks.measured.trials import measured_dataset
 from pma_gym.data.datasets.dataset import Dataset
 from pma_gym.data.files.trial_files import encode_trial
@@ -27,9 +26,6 @@ from pma_gym.terminal import SafeConsole
 
 GIVEN = "serres2008"
 """The model to begin with."""
-
-STATION = "station"
-"""The model that `python -m benchmarks identify` made of the same tables."""
 
 DIAGNOSED_KPA = (150.0, 250.0, 300.0, 400.0, 500.0, 575.0)
 """Pressures that the diagnosis sees. Effects are chosen, and parameters fitted, without the other
@@ -101,7 +97,7 @@ def _computed(stages: Stages, jobs: int, seed: int, most: int, tell: Tell) -> Me
         stages,
         seed,
         jobs,
-        lambda number: _prefixed(tell, f"round {number}: "),
+        lambda number: lambda step, done, all: tell(f"round {number}: {step}", done, all),
         most,
     )
     effects = [name for each in diagnoses for name in each.effects]
@@ -118,19 +114,11 @@ def _computed(stages: Stages, jobs: int, seed: int, most: int, tell: Tell) -> Me
     left_out = folds(
         initial_model, amended, effects, _without, FOLDS, jobs, partial(tell, "pressures left out")
     )
-    final = load_model(stages.folder / f"step_{len(stepped) - 1}.toml")
-    questions = partial(tell, "what is not detectable")
-    not_detectable, proposals = undecidable(final, few, jobs, seed, questions)
-    models = {GIVEN: initial_model, STATION: load_model(STATION), "amended": final}
     return Measured(
         diagnoses,
         stepped,
         left_out,
         floors(),
-        smooth_errors(*judged),
-        not_detectable,
-        proposals,
-        compare_models(models, initial_model),
         0.0,
         _settings(seed, stages),
     )
@@ -191,10 +179,6 @@ def _settings(seed: int, stages: Stages) -> dict[str, Any]:
         "loads_n": LOADS_N,
         "repeats": REPEATS,
     }
-
-
-def _prefixed(tell: Tell, prefix: str) -> Tell:
-    return lambda step, done, total: tell(prefix + step, done, total)
 
 
 @contextmanager

@@ -1,18 +1,13 @@
-"""Whole pressures left out: what models say of table I3's rows that they were not fitted to.
+"""Whole pressures left out: what models say of table I3's rows that they were not fitted to."""
 
-Effects that tables I2 and I3 cannot detect, and experiments that can.
-"""
-
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pma_gym.data.datasets.dataset import Dataset, NamedTrial
 from pma_gym.data.trial import Trial
-from pma_gym.discovery.experiments.detectability import experiment_to_detect
 from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
 from pma_gym.discovery.fitting.fit_problem import FitProblem, Fitted
 from pma_gym.discovery.fitting.free_parameters import FreeParameters, free_parameters, values
@@ -20,9 +15,6 @@ from pma_gym.discovery.preparation.initial_floors import initial_floors
 from pma_gym.discovery.preparation.noise import white_noise
 from pma_gym.discovery.preparation.whitened_residuals import WhitenedResiduals
 from pma_gym.discovery.screening.candidates import candidate_effects
-from pma_gym.discovery.screening.probe_scores import Baseline
-from pma_gym.discovery.screening.score_test import ScreeningScore, screen
-from pma_gym.effects import CATALOGUE
 from pma_gym.estimation.logged import Logged
 from pma_gym.plant.model import Model
 from pma_gym.plant.rigs import RIGS
@@ -195,144 +187,3 @@ def repeat_scatter(data: Dataset) -> dict[str, float]:
             count += apart.size
         scatter[name] = float(np.sqrt(squares / count)) if count else float("nan")
     return {**scatter, AT_LOAD: scatter["extension_mm"]}
-
-
-RESTARTS = 3
-"""How often the search for lengths begins anew."""
-
-LENGTHS: Any = np.array([1.0, 2.0])
-"""Where the search for lengths begins (V of the regulator, V of the motor)."""
-
-ROUGHEST = 0.05
-"""Shortest length that is tried, in volts of either command."""
-
-
-def smooth_errors(seen: Dataset, unseen: Dataset) -> dict[str, float]:
-    """Rms at pressures that were not seen of a Gaussian process fitted to the others.
-
-    Args:
-        seen: trials of I3 that it is fitted to.
-        unseen: trials of I3 that it is judged on.
-    Returns:
-        Rms errors in file units (mm, deg) by `FIGURES`, as functions of the two voltages; and
-        `AT_LOAD`, the extension as a function of regulator voltage and measured load.
-    """
-    errors = {name: _error(seen, unseen, name, at_load=False) for name in FIGURES}
-    return {**errors, AT_LOAD: _error(seen, unseen, "extension_mm", at_load=True)}
-
-
-def _error(seen: Dataset, unseen: Dataset, figure: str, at_load: bool) -> float:
-    from sklearn.gaussian_process import GaussianProcessRegressor
-    from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
-
-    known, values = _rows(seen, figure, at_load)
-    asked, truth = _rows(unseen, figure, at_load)
-    spread = float(values.std())
-    kernel = ConstantKernel(spread**2, (1e-2 * spread**2, 1e3 * spread**2)) * RBF(
-        LENGTHS, (ROUGHEST, 50.0)
-    ) + WhiteKernel(0.01 * spread**2, (1e-6 * spread**2, spread**2))
-    process = GaussianProcessRegressor(kernel, n_restarts_optimizer=RESTARTS, random_state=0)
-    process.fit(known, values - values.mean())
-    return rms(process.predict(asked) + values.mean() - truth)
-
-
-def _rows(data: Dataset, figure: str, at_load: bool) -> tuple[Array, Array]:
-    """What is known of each row, shape (rows, 2), and its figure in file units, shape (rows,)."""
-    trials: Sequence[Trial] = [each.trial for each in data.trials if each.trial.measures("angle")]
-    signal, plus, minus, unit = FIGURES[figure]
-    read = np.array([each.measurements[signal] for each in trials])
-    values = (read[:, plus] - read[:, minus]) / SI_FACTORS[unit]
-    pulled = [
-        # 100 N a volt, about: what matters is that a step means as much.
-        each.measurements["load"][LOADED] / 100.0 if at_load else each.commands["motor_voltage"][1]
-        for each in trials
-    ]
-    regulator = [each.commands["regulator_voltage"][0] for each in trials]
-    known, there = np.column_stack([regulator, pulled]), np.isfinite(values)
-    there &= np.isfinite(known).all(axis=1)
-    return known[there], values[there]
-
-
-MOST = 3
-"""Most experiments that are proposed, each for what those before would not show."""
-
-
-@dataclass(frozen=True)
-class Undecidable:
-    """An effect that these tables cannot tell from none.
-
-    Attributes:
-        name: its name.
-        acts: where it acts: its port in the station.
-        shows_from: how many times its usual size it would need to show; None if no size would.
-        experiment: which proposal would show it, counted from 1; None if none of them.
-    """
-
-    name: str
-    acts: str
-    shows_from: float | None
-    experiment: int | None
-
-
-@dataclass(frozen=True)
-class Proposal:
-    """An experiment.
-
-    Attributes:
-        excitation: in words.
-        shows: effects that it would show at their usual size.
-        minutes: how long it takes.
-    """
-
-    excitation: str
-    shows: tuple[str, ...]
-    minutes: float
-
-
-def undecidable(
-    model: Model,
-    data: Dataset,
-    threads: int = 1,
-    seed: int = 0,
-    progress: Callable[[int, int], None] | None = None,
-) -> tuple[list[Undecidable], list[Proposal]]:
-    """Effects that trials would not show at their usual size, beside a model; and what would.
-
-    Args:
-        model: the amended model.
-        data: the trials.
-        threads: how many simulate.
-        seed: of what is random in excitations.
-        progress: called with what is done and the total.
-    """
-    rig = Rig.of(data, model, threads)
-    fit = rig.fit((), model)
-    if fit is None:
-        raise ValueError(f"{model.name} cannot be simulated on tables I2 and I3")
-    every = list(rig.known.values())
-    baseline = Baseline.at(rig.problem.whitened_residuals(fit.model), fit.values, fit.steps)
-    scores = screen(
-        baseline,
-        every,
-        seed,
-        lambda candidate: rig.problem.probed(fit.model, candidate),
-        None if progress is None else lambda done: progress(done, len(every) + MOST),
-    )
-    dim = [each for each in scores if each.resolvable is None or each.resolvable > 1.0]
-    proposals: list[Proposal] = []
-    left = [each.candidate for each in dim]
-    while left and len(proposals) < MOST:
-        proposal = experiment_to_detect(rig.problem, fit, left, scores, seed)
-        if proposal is None:
-            break
-        proposals.append(Proposal(proposal.excitation, tuple(proposal.separates), proposal.minutes))
-        left = [candidate for candidate in left if candidate.name not in proposal.separates]
-    return [_entry(each, proposals) for each in dim], proposals
-
-
-def _entry(each: ScreeningScore, proposals: list[Proposal]) -> Undecidable:
-    name = each.candidate.name
-    places = [k for k, proposal in enumerate(proposals, 1) if name in proposal.shows]
-    return Undecidable(
-        name, CATALOGUE[each.candidate.effect].port, each.resolvable, places[0] if places else None
-    )

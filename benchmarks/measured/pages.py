@@ -1,27 +1,29 @@
 """The page of the job: what was found first, then by how much each effect helps."""
 
 import numpy as np
+from rich.console import Console
 
 from benchmarks.measured.steps import PHASE_NAMES
 from benchmarks.measured.tables import (
     COLUMNS,
-    COMPARISON_HEADER,
-    NOT_DETECTABLE_HEADER,
     REPLAY_HEADER,
     TARGET_MM,
     Measured,
-    comparison_rows,
     error_rows,
     experiment_text,
-    not_detectable_rows,
     readable,
     replay_rows,
     round_rows,
     verdict_text,
 )
+from pma_gym.cli.terminal import terminal_table
 from pma_gym.discovery.report.pictures import AFTER, BEFORE, FLOOR, PARAMETERS
 from pma_gym.pages.document import Block, Callout, Heading, Paragraph, Picture, TextTable, to_html
 from pma_gym.pages.figures import legend_below, picture, png
+from pma_gym.terminal import SafeConsole
+
+WIDTH = 120
+"""Columns of text where there is no terminal."""
 
 _SHOWN = (("extension_mm", "extension, rms error (mm)"), ("rotation_deg", "rotation, rms (deg)"))
 _REPLAYS = (("displacement", "mm"), ("I", "deg"), ("II", "deg"), ("III", "deg"))
@@ -36,7 +38,7 @@ def measured_page(result: Measured) -> str:
 def _blocks(result: Measured) -> list[Block]:
     effects = [readable(name) for name in result.steps[-1].effects]
     names = tuple(label for _, label in COLUMNS)
-    blocks: list[Block] = [
+    return [
         Heading("Tables I2 and I3, diagnosed", 1),
         Callout(
             f"Beginning with `{result.settings['model']}`, the diagnosis added "
@@ -66,38 +68,26 @@ def _blocks(result: Measured) -> list[Block]:
             "The printed voltages of the displacement and rotation trials, open loop: mean "
             "absolute error of the mean position against tables 21 and 27-29.",
         ),
-    ]
-    for phase, label in PHASE_NAMES.items():
-        unit = "mm" if phase == "displacement" else "deg"
-        blocks.append(
+        *(
             TextTable(
-                f"{label}: mean absolute error ({unit}, slope in {unit}/s)",
+                f"{label}: mean absolute error (mm or deg, slope a second)",
                 REPLAY_HEADER,
                 replay_rows(result, phase),
             )
-        )
-    blocks.append(Heading("What these tables cannot tell"))
-    blocks.append(
-        TextTable(
-            "Effects that these tables would not show at their usual size, beside the amended "
-            "model",
-            NOT_DETECTABLE_HEADER,
-            not_detectable_rows(result),
-            words=2,
-        )
-    )
-    blocks += [Paragraph(text) for text in experiment_text(result)]
-    blocks += [
-        Heading("Validation under triangular pressure (figures 28 and 29)"),
-        Paragraph(
-            "The curves are pictures; their text gives the error of the dissertation's own model "
-            "in mm and in percent of the contraction, taken here for the stroke."
+            for phase, label in PHASE_NAMES.items()
         ),
-        TextTable(
-            "Models and the printed figures", COMPARISON_HEADER, comparison_rows(result), words=2
-        ),
+        *(Paragraph(text) for text in experiment_text(result)),
     ]
-    return blocks
+
+
+def print_measured(result: Measured, console: Console) -> None:
+    """The page's tables, and what is said of targets and experiments."""
+    console = console if console.is_terminal else SafeConsole(file=console.file, width=WIDTH)
+    for block in _blocks(result):
+        if isinstance(block, TextTable):
+            console.print(terminal_table(block))
+    for line in (*experiment_text(result), *verdict_text(result)):
+        console.print(line, highlight=False)
 
 
 def errors_picture(result: Measured) -> bytes:

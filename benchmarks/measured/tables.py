@@ -4,13 +4,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from rich.console import Console
-from rich.table import Table
-
-from benchmarks.measured.held_out import Proposal, Undecidable
 from benchmarks.measured.rounds import Round
-from benchmarks.measured.steps import PHASE_NAMES, ModelComparison, Step
-from pma_gym.terminal import SafeConsole
+from benchmarks.measured.steps import Step
 
 
 @dataclass(frozen=True)
@@ -22,10 +17,6 @@ class Measured:
         steps: models with one effect more at a time.
         folds: rms errors of all effects with every pressure left out once, by figure.
         floors: scatter between repeats, by figure.
-        smooth: rms errors at unseen pressures of a smooth function of the commands, by figure.
-        not_detectable: effects that I2 and I3 cannot tell beside the amended model.
-        proposals: experiments that would show them.
-        comparisons: models against the validation under triangular pressure.
         seconds: how long this run took (s), without stages kept from an earlier one.
         settings: what was diagnosed, and how many stages which code made.
     """
@@ -34,10 +25,6 @@ class Measured:
     steps: list[Step]
     folds: dict[str, float]
     floors: dict[str, float]
-    smooth: dict[str, float]
-    not_detectable: list[Undecidable]
-    proposals: list[Proposal]
-    comparisons: list[ModelComparison]
     seconds: float
     settings: dict[str, Any]
 
@@ -53,9 +40,6 @@ COLUMNS = (
     ("return_deg", "return rotation (deg)"),
 )
 """Figures and their headings."""
-
-WIDTH = 120
-"""Columns of text where there is no terminal."""
 
 Rows = list[tuple[str, ...]]
 
@@ -94,8 +78,6 @@ def error_rows(result: Measured) -> Rows:
     ]
     every = tuple(f"{result.folds[key]:.2f}" for key, _ in COLUMNS)
     rows.append(("all effects, every pressure left out once", *every))
-    smooth = tuple(f"{result.smooth[key]:.2f}" for key, _ in COLUMNS)
-    rows.append(("a smooth function of the commands", *smooth))
     rows.append(("scatter of the repeats", *(f"{result.floors[key]:.2f}" for key, _ in COLUMNS)))
     return rows
 
@@ -114,26 +96,6 @@ def replay_rows(result: Measured, phase: str) -> Rows:
     ]
 
 
-def comparison_rows(result: Measured) -> Rows:
-    """Models against the validation under triangular pressure."""
-    return [
-        (
-            str(each.figure),
-            each.model,
-            f"{each.stroke_mm:.1f}",
-            f"{each.printed_mm[0]:.1f}-{each.printed_mm[1]:.1f}",
-            f"{each.apart_mm:.2f}",
-            f"{each.rmse_mm:.2f}",
-        )
-        for each in result.comparisons
-    ]
-
-
-COMPARISON_HEADER = (
-    *("figure", "model", "stroke (mm)", "measured (mm)"),
-    *("from serres2008, rms (mm)", "serres2008 printed, rms (mm)"),
-)
-
 REPLAY_HEADER = ("model", "slope", "intercept", "mean", "mean, signed", "RMSE", "trials")
 
 
@@ -148,62 +110,7 @@ def experiment_text(result: Measured) -> list[str]:
             if len(names) == 1:
                 why = f"see whether {names[0]} is there"
             paragraphs.append(f"Round {number} proposes, to {why}: {following['excitation']}.")
-    for number, each in enumerate(result.proposals, 1):
-        shows = ", ".join(map(readable, each.shows))
-        paragraphs.append(
-            f"Experiment {number} ({each.minutes:.2g} min): {each.excitation}. "
-            f"It would show {shows}."
-        )
     return paragraphs
-
-
-def not_detectable_rows(result: Measured) -> Rows:
-    """Effects that these tables cannot tell, and which experiment would."""
-    return [
-        (
-            readable(each.name),
-            "undecidable",
-            "at no size" if each.shows_from is None else f"{each.shows_from:.2g}",
-            "none of these" if each.experiment is None else str(each.experiment),
-        )
-        for each in sorted(result.not_detectable, key=lambda e: e.shows_from or 1e99)
-    ]
-
-
-NOT_DETECTABLE_HEADER = (
-    "effect",
-    "verdict",
-    "shows from, times its usual size",
-    "shown by experiment",
-)
-
-
-def print_measured(result: Measured, console: Console) -> None:
-    """All of it as tables."""
-    console = console if console.is_terminal else SafeConsole(file=console.file, width=WIDTH)
-    _print(
-        console,
-        "Diagnoses of I2 and I3",
-        ("round", "trials", "verdict", "added", "p", "explains as much"),
-        round_rows(result.rounds),
-    )
-    names = tuple(label for _, label in COLUMNS)
-    title = "Table I3 at pressures that took no part: rms error, from the commands alone"
-    _print(console, title, ("model", *names), error_rows(result))
-    for phase, label in PHASE_NAMES.items():
-        title = f"Replay of the printed voltages, {label}: mean absolute error"
-        _print(console, title, REPLAY_HEADER, replay_rows(result, phase))
-    _print(
-        console,
-        "Triangular pressure, figures 28 and 29",
-        COMPARISON_HEADER,
-        comparison_rows(result),
-    )
-    _print(
-        console, "What I2 and I3 cannot tell", NOT_DETECTABLE_HEADER, not_detectable_rows(result)
-    )
-    for line in (*experiment_text(result), *verdict_text(result)):
-        console.print(line, highlight=False)
 
 
 def verdict_text(result: Measured) -> Iterator[str]:
@@ -214,8 +121,7 @@ def verdict_text(result: Measured) -> Iterator[str]:
     yield (
         f"Extension at pressures that took no part: {first.unseen['extension_mm']:.2f} mm as "
         f"given, {got:.2f} mm with {len(last.effects)} effects; target {TARGET_MM:g} mm: {met}; "
-        f"a smooth function of the commands misses {result.smooth['extension_mm']:.2f} mm, repeats "
-        f"scatter by {result.floors['extension_mm']:.2f} mm."
+        f"repeats scatter by {result.floors['extension_mm']:.2f} mm."
     )
     yield (
         f"Rotation: {first.unseen['rotation_deg']:.2f} deg as given, "
@@ -230,12 +136,3 @@ def _label(name: str) -> str:
 
 def _figure(entry: Any, key: str) -> str:  # noqa: ANN401
     return f"{float(entry[key]):.2f}"
-
-
-def _print(console: Console, title: str, header: Sequence[str], rows: Rows) -> None:
-    table = Table(title=title, title_justify="left")
-    for number, name in enumerate(header):
-        table.add_column(name, justify="left" if number == 0 else "right")
-    for row in rows:
-        table.add_row(*row)
-    console.print(table)

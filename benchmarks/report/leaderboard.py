@@ -16,7 +16,7 @@ from benchmarks.report.errors import Errors, Measure, SuiteRecord, measures, poo
 from benchmarks.report.margins import Condition, conditions, is_linear
 from benchmarks.report.standings import Standings
 from benchmarks.report.tables import standings_table
-from benchmarks.report.verdicts import Verdict, bounds_needed, verdicts
+from benchmarks.report.verdicts import Verdict, verdicts
 from benchmarks.runner.provenance import check_run, finished_rows, read_run
 from benchmarks.suites.suite import Entry, FrozenSuite, SuiteError
 from controllers import CONTROLLERS
@@ -134,22 +134,10 @@ class Leaderboard:
     @cached_property
     def verdicts(self) -> list[Verdict]:
         """The suite's targets; only what all cases have been run for has a figure."""
-        known = self._whole_standings
+        known = {name: each for name, each in self.standings.items() if self.whole(each)}
         units = {name: each.errors.measure.unit for name, each in self.standings.items()}
-        return verdicts(self.suite.targets, known, self.labels, units, self._bound)
-
-    def start_bounds(self) -> None:
-        """Let other processes compute the bounds that the targets need."""
-        if self.bounds is not None:
-            self.bounds.start(bounds_needed(self.suite.targets, self._whole_standings))
-
-    @cached_property
-    def _whole_standings(self) -> dict[str, Standings]:
-        return {name: each for name, each in self.standings.items() if self.whole(each)}
-
-    @cached_property
-    def _bound(self) -> Bounds:
-        return self.bounds or Bounds(self.suite.model)
+        bounds = self.bounds or Bounds(self.suite.model)
+        return verdicts(self.suite.targets, known, self.labels, units, bounds)
 
     def _repr_html_(self) -> str:
         """What a notebook shows: the standings in every measure."""
@@ -228,7 +216,4 @@ def read_leaderboard(suite: FrozenSuite, folder: Path, bounds: Bounds | None = N
 
 def keep_bounds(suite: FrozenSuite, folder: Path) -> None:
     """Compute the achievable bounds that the targets need, and keep them for the page."""
-    with Bounds(suite.model, folder) as bounds:
-        leaderboard = read_leaderboard(suite, folder, bounds)
-        leaderboard.start_bounds()
-        _ = leaderboard.verdicts
+    _ = read_leaderboard(suite, folder, Bounds(suite.model, folder)).verdicts

@@ -105,25 +105,15 @@ def page_blocks(leaderboard: Leaderboard) -> list[Block]:
     return blocks + _origin_blocks(leaderboard)
 
 
-def score_pictures(leaderboard: Leaderboard) -> dict[str, Plot]:
-    """Every plot of the scores that there are figures for, by name."""
-    styles = styles_of(leaderboard.labels)
-    pictures: dict[str, Plot] = {}
-    single = shown_standings(leaderboard)
-    if single:
-        pictures["distributions"] = distribution_plot(single, styles)
-        pictures["profiles"] = profile_plot(single, styles)
-        pictures["pressures"] = pressure_plot(single, styles)
-    return pictures
-
-
-def loop_pictures(leaderboard: Leaderboard) -> dict[str, Plot]:
-    """Plots of the linear controllers' loops, by name."""
-    styles = styles_of(leaderboard.labels)
-    return {
-        f"loops_{task}": loop_plot(conditions, styles)
-        for task, conditions in leaderboard.loops.items()
-    }
+def drawn_plots(leaderboard: Leaderboard) -> dict[str, Plot]:
+    """Every plot that there are figures for, by name: scores, loops of linear controllers."""
+    styles, loops = styles_of(leaderboard.labels), leaderboard.loops
+    plots = {f"loops_{task}": loop_plot(each, styles) for task, each in loops.items()}
+    if single := shown_standings(leaderboard):
+        plots["distributions"] = distribution_plot(single, styles)
+        plots["profiles"] = profile_plot(single, styles)
+        plots["pressures"] = pressure_plot(single, styles)
+    return plots
 
 
 def _opening(leaderboard: Leaderboard) -> list[Block]:

@@ -2,19 +2,12 @@
 
 import shutil
 from collections.abc import Callable
-from functools import partial
 from pathlib import Path
 from typing import Any
 
-from benchmarks.executors.local import Background
 from benchmarks.files import csv_text, write_bytes, write_text
 from benchmarks.report.leaderboard import Leaderboard, read_leaderboard
-from benchmarks.report.page import (
-    incomplete_counts,
-    loop_pictures,
-    page_blocks,
-    score_pictures,
-)
+from benchmarks.report.page import drawn_plots, incomplete_counts, page_blocks
 from benchmarks.report.standings import Pair
 from benchmarks.report.statistics import Interval
 from benchmarks.report.tables import ranks_table
@@ -69,13 +62,10 @@ def write_leaderboard(
     Returns:
         The page.
     """
-    with Background(partial(_score_files, leaderboard, vector)) as plots:
-        _compute(leaderboard, progress)
-        progress("plots", 0, 2)
-        of_loops = picture_files(loop_pictures(leaderboard), vector)
-        progress("plots", 1, 2)
-        files = plots.result() | of_loops
-        progress("plots", 2, 2)
+    _compute(leaderboard, progress)
+    progress("plots", 0, 1)
+    files = picture_files(drawn_plots(leaderboard), vector)
+    progress("plots", 1, 1)
     blocks, pictures = page_blocks(leaderboard), pngs(files)
     texts = {
         TEXT: to_markdown(blocks, pictures, PLOTS),
@@ -91,10 +81,6 @@ def write_leaderboard(
     for name, text in texts.items():
         write_text(out / name, text)
     return out / PAGE
-
-
-def _score_files(leaderboard: Leaderboard, vector: bool) -> dict[str, bytes]:
-    return picture_files(score_pictures(leaderboard), vector)
 
 
 def _compute(leaderboard: Leaderboard, progress: OnStep) -> None:

@@ -284,7 +284,8 @@ def obstacle_table(
         # On the way there a motor pulls; what it cannot do shows on the way back.
         *_, standings = (each for each in every if task in each.errors.measure.tasks)
         errors = standings.errors
-        names = [at if at is None else errors.names[at] for at in _leaders(standings)]
+        leaders = (standings.bound, standings.best)
+        names = [at if at is None else errors.names[at] for at in leaders]
         cells = [
             NONE if name is None else figure(mean_by_trial(standings, name)[task, kpa])
             for name in names
@@ -297,11 +298,6 @@ def obstacle_table(
         rows,
         words=4,
     )
-
-
-def _leaders(standings: Standings) -> tuple[int | None, int | None]:
-    """Numbers of the bound and of the best rival."""
-    return standings.bound, standings.best
 
 
 def verdict_table(checks: Sequence[Verdict]) -> TextTable:

@@ -128,20 +128,6 @@ def largest_excess(means: Mapping[tuple[str, float], float], bound: Bound) -> fl
     return largest
 
 
-def bounds_needed(
-    targets: tuple[Target, ...], standings: Mapping[str, Standings]
-) -> list[tuple[str, float]]:
-    """Task and pressure (kPa) of the bounds that `verdicts` is sure to ask for, each once."""
-    trials = []
-    for target in targets:
-        known = standings.get(target.measure)
-        if target.figure == "above_bound" and known is not None:
-            for name in set(target.controllers) & set(known.errors.names):
-                means = mean_by_trial(known, name)
-                trials.append(max(means, key=lambda trial: means[trial]))
-    return sorted(set(trials))
-
-
 def _of_two(target: Target, standings: Standings | None, labels: Mapping[str, str]) -> Verdict:
     """A target of one controller beside another."""
     first, second = target.controllers

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from benchmarks.reproduction.results import Results
-from benchmarks.runner.phase_score import PHASES, PhaseScore, measured_score
+from benchmarks.runner.phase_score import PHASES, measured_score
 from pma_gym.data.serres2008 import load_table
 
 QUANTITIES = ("slope", "intercept", "mean", "rmse", "line_error", "scatter")
@@ -63,7 +63,8 @@ def replay_errors(results: Results, model: str, task: str, phase: str) -> list[R
         simulated = results.phase(model, results.suite.goals.replay, task, pressure, phase)
         if simulated is not None:
             measured = measured_score(task, phase, pressure)
-            errors.append(ReplayError(task, phase, pressure, *_difference(simulated, measured)))
+            off = (getattr(simulated, name) - getattr(measured, name) for name in QUANTITIES)
+            errors.append(ReplayError(task, phase, pressure, *off))
     return errors
 
 
@@ -127,7 +128,3 @@ def _rotation_profile(pressure_kpa: float) -> np.ndarray:
         if float(table["pressure_kpa"][0]) == pressure_kpa:
             return table["motor_voltage_v"][(table["time_s"] >= 5.0) & (table["time_s"] < 10.0)]
     raise KeyError(f"no rotation trial at {pressure_kpa:g} kPa")
-
-
-def _difference(simulated: PhaseScore, measured: PhaseScore) -> list[float]:
-    return [getattr(simulated, name) - getattr(measured, name) for name in QUANTITIES]

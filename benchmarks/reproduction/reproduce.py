@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 from rich.console import Console
-from rich.table import Table
 
 from benchmarks.bounds import Bounds
 from benchmarks.executors.executor import Executor, run_all
@@ -25,14 +24,15 @@ from benchmarks.runner.provenance import check_run, read_run
 from benchmarks.runner.run import FAILED, INTERRUPTED, SuiteRun, run_missing, say_interrupted
 from benchmarks.suites.reproduction import ReproductionSuite
 from benchmarks.suites.suite import SuiteError
+from pma_gym.cli.terminal import terminal_table
 from pma_gym.data.trial import Trial
-from pma_gym.pages.document import TextTable, to_html, to_markdown
+from pma_gym.pages.document import to_html, to_markdown
 from pma_gym.pages.figures import picture_files, pngs
 
 
 def print_summary(results: Results, report: Path, console: Console) -> None:
     """Tables 22 and 30 condensed, the speed, and where the report is."""
-    console.print(_shown(summary_table(results)))
+    console.print(terminal_table(summary_table(results)))
     print_failures(results, console)
     info = results.info
     console.print(
@@ -54,15 +54,6 @@ def print_failures(results: Results, console: Console) -> None:
     )
     for names, reason in results.failure_reasons():
         console.print(f"  {names}: {reason}", markup=False, highlight=False)
-
-
-def _shown(text: TextTable) -> Table:
-    table = Table(text.header[0], title=text.title, title_justify="left")
-    for name in text.header[1:]:
-        table.add_column(name.replace(" (", "\n("), justify="right")
-    for row in text.rows:
-        table.add_row(*row)
-    return table
 
 
 PLOTS = "plots"
@@ -257,9 +248,9 @@ def _results(
     failed = {score.case.name for score in scores if score.failure}
     pictured = pictured_trials(suite, run.todo, failed, executor) if pictures else {}
     pressures = suite.pressures_kpa.get("rotation", ())
-    with Bounds(suite.models[0], folder) as bounds:
-        failures, complete = bounds.compute([("rotation", p) for p in pressures], executor)
-        known = {p: bound for p in pressures if (bound := bounds.known("rotation", p)) is not None}
+    bounds = Bounds(suite.models[0], folder)
+    failures, complete = bounds.compute([("rotation", p) for p in pressures], executor)
+    known = {p: bound for p in pressures if (bound := bounds.known("rotation", p)) is not None}
     if not complete:
         raise KeyboardInterrupt
     reasons = {pressure: why for (_, pressure), why in failures.items()}

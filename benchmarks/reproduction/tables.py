@@ -88,8 +88,10 @@ def regression_table(results: Results, model: str, task: str, phase: str) -> Tex
     rows: list[list[str]] = []
     for pressure in results.suite.pressures_kpa[task]:
         scores = [figures(pressure) for figures in who.values()]
-        rows.append([f"{pressure:g}", f"intercept ({unit})", *map(_intercept, scores)])
-        rows.append(["", f"slope ({unit}/s)", *map(_slope, scores)])
+        rows.append(
+            [f"{pressure:g}", f"intercept ({unit})", *(_term(each, "intercept") for each in scores)]
+        )
+        rows.append(["", f"slope ({unit}/s)", *(_term(each, "slope") for each in scores)])
     part = "" if task == "displacement" else f", phase {phase}"
     return TextTable(
         f"Table {REGRESSION_TABLES[phase]}{part}: line through the trial (standard error)",
@@ -121,12 +123,10 @@ def _rmse_cells(score: PhaseScore | None) -> tuple[str, str]:
     return _number(score.rmse, 3), _number(score.percent_of_range, 2)
 
 
-def _intercept(score: PhaseScore | None) -> str:
-    return MISSING if score is None else _with_error(score.intercept, score.intercept_std_error)
-
-
-def _slope(score: PhaseScore | None) -> str:
-    return MISSING if score is None else _with_error(score.slope, score.slope_std_error)
+def _term(score: PhaseScore | None, name: str) -> str:
+    if score is None:
+        return MISSING
+    return _with_error(getattr(score, name), getattr(score, f"{name}_std_error"))
 
 
 def _with_error(estimate: float, error: float) -> str:

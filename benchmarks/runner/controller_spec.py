@@ -212,7 +212,9 @@ def raised_at(error: BaseException, path: Path) -> str:
     if not path.name:
         return ""
     frames = traceback.extract_tb(error.__traceback__)
-    own = [at for at, frame in enumerate(frames) if _same_file(frame.filename, path)]
+    # Whatever links lead to the file.
+    paths = [Path(frame.filename).resolve() for frame in frames]
+    own = [at for at, each in enumerate(paths) if each == path.resolve()]
     if not own:
         return ""
     where, last = f"line {frames[own[-1]].lineno} of {path.name}", frames[-1]
@@ -221,11 +223,6 @@ def raised_at(error: BaseException, path: Path) -> str:
     if own[-1] < len(frames) - 1 and beside:
         where += f", which calls line {last.lineno} of {Path(last.filename).name}"
     return where
-
-
-def _same_file(name: str, path: Path) -> bool:
-    """Whether a frame's file is a path's, whatever links lead there."""
-    return Path(name).resolve() == path.resolve()
 
 
 def _check_interface(spec: ControllerSpec, controller: object) -> None:

@@ -4,7 +4,7 @@ import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +21,10 @@ from pma_gym.cli.progress import StepProgress
 
 FAILED, INTERRUPTED = 1, 130
 """Exit codes."""
+
+
+class EnoughError(Exception):
+    """Raised by `on_row`: the rest of a suite is not worth running."""
 
 
 @dataclass(frozen=True)
@@ -54,6 +58,8 @@ def run_missing(
     executor: Executor,
     console: Console,
     traces: str = "",
+    on_row: Callable[[Row], None] = lambda row: None,
+    untrusted: bool = False,
 ) -> SuiteRun:
     """Run what a folder's journal lacks of a suite.
 
@@ -64,6 +70,8 @@ def run_missing(
         executor: where the cases run.
         console: where to print.
         traces: form of the time series that are written too; none if empty.
+        on_row: called with each new row; may raise `EnoughError`, which ends the run.
+        untrusted: run no case twice, see `run_all`.
     Returns:
         The run; Ctrl-C ends it early, says so, and what is done stays in the journal.
     Raises:
@@ -76,13 +84,15 @@ def run_missing(
     info = run_info(todo, entries, out, executor.jobs)
     write_run(out, info, complete=False)
     rows = list(todo.known.values())
+    run = SuiteRun(todo, rows, info, began, complete=False)
     try:
-        complete = _run(todo, entries, out, executor, rows, console)
+        if _run(run, entries, out, executor, console, on_row, untrusted):
+            return replace(run, complete=True)
+    except EnoughError:
+        return run
     except KeyboardInterrupt:
-        complete = False
-    run = SuiteRun(todo, rows, info, began, complete)
-    if not complete:
-        say_interrupted(run, out, console)
+        pass
+    say_interrupted(run, out, console)
     return run
 
 
@@ -96,14 +106,16 @@ def say_interrupted(run: SuiteRun, out: Path, console: Console) -> None:
 
 
 def _run(
-    todo: PendingCases,
+    run: SuiteRun,
     entries: Sequence[Entry],
     out: Path,
     executor: Executor,
-    rows: list[Row],
     console: Console,
+    on_row: Callable[[Row], None],
+    untrusted: bool,
 ) -> bool:
     """Run what is missing; adds to the rows."""
+    todo, rows = run.todo, run.rows
     if not todo.missing:
         return True
     with console.status("drawing the stations, compiling their equations"):
@@ -119,8 +131,9 @@ def _run(
             rows.append(row)
             advance(row)
             say(len(rows))
+            on_row(row)
 
-        return execute(todo, executor, out, on_done)
+        return execute(todo, executor, out, on_done, untrusted)
 
 
 @contextmanager

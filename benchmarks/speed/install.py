@@ -29,16 +29,9 @@ def install(peer: Peer) -> None:
     shutil.rmtree(peer.home, ignore_errors=True)
     peer.home.parent.mkdir(exist_ok=True)
     _run(sys.executable, "-m", "venv", str(peer.home))
-    constrained = ("-c", str(ROOT / "constraints.txt"))
-    if peer.project is not None:
-        # As `make test` does: PyTorch first, so that its pin decides which build comes.
-        for name in ("torch", "-e") if peer.project else ("-e",):
-            project = f"{ROOT}[{peer.project}]" if peer.project else str(ROOT)
-            _run(str(peer.interpreter), *_PIP, *constrained, name, *[project] * (name == "-e"))
-    if peer.pinned:
-        # The pins are complete; what a package asks for beyond them, the worker does not use.
-        _run(str(peer.interpreter), *_PIP, "--no-deps", "-r", str(peer.pins))
-    peer.stamp.write_text(peer.digest, encoding="utf-8")
+    # The pins are complete; what a package asks for beyond them, the worker does not use.
+    _run(str(peer.interpreter), *_PIP, "--no-deps", "-r", str(peer.pins))
+    shutil.copy(peer.pins, peer.stamp)
 
 
 def _run(*command: str) -> None:
@@ -60,7 +53,7 @@ def main(
     ] = None,
 ) -> None:
     """Install what the speed of this package is compared with, into .peers/."""
-    known = {peer.name: peer for peer in PEERS if peer.installed}
+    known = {peer.name: peer for peer in PEERS}
     for name in names or ():
         if name not in known:
             print(f"error: unknown peer {name!r}; known: {', '.join(known)}", file=sys.stderr)

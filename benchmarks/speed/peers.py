@@ -1,47 +1,31 @@
 """What is measured, in one table, and the environments that the others live in.
 
-What needs more than this package's core has an environment of its own, `.peers/NAME`, which
-`make peers` makes from the pins in `requirements/NAME.txt`.
+What other simulators need has an environment of its own, `.peers/NAME`, which `make peers` makes
+from the pins in `requirements/NAME.txt`.
 """
 
-import hashlib
-import importlib.util
 import os
 import sys
-import tomllib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 ROOT = Path(__file__).resolve().parents[2]
 FOLDER = ROOT / ".peers"
 """Where the environments are; ignored by git."""
 
 
-@dataclass(frozen=True)
-class Peer:
-    """The packages that some rows need.
+class Peer(NamedTuple):
+    """The packages that some rows need; without pins those of this interpreter.
 
     Attributes:
         name: of its environment's folder.
         title: its name for readers.
-        pinned: whether it has an environment of its own with the pins in `requirements`.
-        project: extras of this project that its environment has, "" for the core alone; None if
-            it has not this project.
-        modules: what this interpreter must have to serve in place of that environment.
     """
 
     name: str
     title: str
-    pinned: bool = False
-    project: str | None = None
-    modules: tuple[str, ...] = ()
-
-    @property
-    def installed(self) -> bool:
-        """Whether `make peers` installs it."""
-        return self.pinned or self.project is not None
 
     @property
     def pins(self) -> Path:
@@ -55,30 +39,8 @@ class Peer:
 
     @property
     def stamp(self) -> Path:
-        """A file that says what was installed, written last."""
-        return self.home / ".installed"
-
-    @property
-    def digest(self) -> str:
-        """What the stamp says if the installation is that of these pins."""
-        texts = [self.pins.read_text(encoding="utf-8")] if self.pinned else []
-        if self.project is not None:
-            asked = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-            texts += [(ROOT / "constraints.txt").read_text(encoding="utf-8")]
-            texts += asked["dependencies"] + asked["optional-dependencies"].get(self.project, [])
-        return hashlib.sha256("\0".join(texts).encode()).hexdigest()[:16]
-
-    @property
-    def is_here(self) -> bool:
-        """Whether this interpreter has all packages of the peer."""
-        if self.modules:
-            return all(importlib.util.find_spec(name) for name in self.modules)
-        return not self.installed
-
-    @property
-    def is_ready(self) -> bool:
-        """Whether its environment is complete."""
-        return self.stamp.is_file() and self.stamp.read_text(encoding="utf-8") == self.digest
+        """The pins that were installed, written last."""
+        return self.home / "installed.txt"
 
     @property
     def interpreter(self) -> Path:
@@ -87,23 +49,20 @@ class Peer:
 
     @property
     def python(self) -> Path | None:
-        """The interpreter that measures its rows; None if it is not installed."""
-        if self.is_here:
+        """The interpreter that measures its rows; None if it is not installed with these pins."""
+        if not self.pins.is_file():
             return Path(sys.executable)
-        return self.interpreter if self.is_ready else None
+        ready = self.stamp.is_file() and self.stamp.read_bytes() == self.pins.read_bytes()
+        return self.interpreter if ready else None
 
 
-OWN, GYMNASIUM, SCIPY = Peer("own", "pma-gym"), Peer("classic", "Gymnasium"), Peer("scipy", "scipy")
-MUJOCO = Peer("mujoco", "MuJoCo", pinned=True)
-DM_CONTROL = Peer("dm_control", "dm_control", pinned=True)
-ENVPOOL = Peer("envpool", "EnvPool", pinned=True)
-GYMNAX = Peer("gymnax", "gymnax", pinned=True)
-MOTOR = Peer("electric_motor", "gym-electric-motor", pinned=True)
-PCGYM = Peer("pcgym", "PC-gym", pinned=True)
-DOMPC = Peer("dompc", "do-mpc", pinned=True, project="")
-SB3 = Peer("sb3", "Stable-Baselines3", project="rl", modules=("torch", "stable_baselines3"))
+OWN = Peer("own", "pma-gym")
+MUJOCO, DM_CONTROL = Peer("mujoco", "MuJoCo"), Peer("dm_control", "dm_control")
+ENVPOOL, GYMNAX = Peer("envpool", "EnvPool"), Peer("gymnax", "gymnax")
+MOTOR, PCGYM = Peer("electric_motor", "gym-electric-motor"), Peer("pcgym", "PC-gym")
 
-PEERS = (OWN, GYMNASIUM, SCIPY, MUJOCO, DM_CONTROL, ENVPOOL, GYMNAX, MOTOR, PCGYM, DOMPC, SB3)
+PEERS = (MUJOCO, DM_CONTROL, ENVPOOL, GYMNAX, MOTOR, PCGYM)
+"""Those that `make peers` installs."""
 
 
 @dataclass(frozen=True)
@@ -116,7 +75,6 @@ class Row:
         peer: who has the packages.
         make: the function of `worker` that prepares it.
         settings: keyword arguments of that function.
-        cores: cores that it needs.
     """
 
     key: str
@@ -124,7 +82,11 @@ class Row:
     peer: Peer
     make: str
     settings: Mapping[str, Any] = field(default_factory=dict)
-    cores: int = 1
+
+    @property
+    def cores(self) -> int:
+        """Cores that it needs."""
+        return self.settings.get("threads", 1)
 
 
 DISPLACEMENT, ROTATION = "pma_gym/IsokineticDisplacement-v0", "pma_gym/IsokineticRotation-v0"
@@ -143,8 +105,8 @@ def _single() -> Iterator[Row]:
     yield Row("single/own", f"pma-gym, displacement: {step}", OWN, "one", {"name": DISPLACEMENT})
     yield Row("single/own_rotation", f"pma-gym, rotation: {step}", OWN, "one", {"name": ROTATION})
     for key, peer, name, step in (
-        ("CartPole", GYMNASIUM, "CartPole-v1", "20 ms; 4 states, one Euler step"),
-        ("Pendulum", GYMNASIUM, "Pendulum-v1", "50 ms; 2 states, one Euler step"),
+        ("CartPole", OWN, "CartPole-v1", "20 ms; 4 states, one Euler step"),
+        ("Pendulum", OWN, "Pendulum-v1", "50 ms; 2 states, one Euler step"),
         ("InvertedPendulum", MUJOCO, "InvertedPendulum-v5", "40 ms; two Runge-Kutta steps"),
     ):
         yield Row(f"single/{key}", f"{name}: {step}", peer, "one", {"name": name})
@@ -156,13 +118,12 @@ def _single() -> Iterator[Row]:
         yield Row(f"single/gem_{drive}", title, MOTOR, "one", settings)
     yield Row("single/pcgym", "PC-gym reactor: 13 s; 2 states, CVODES", PCGYM, "reactor")
     step = "10 ms of pma-gym's plant alone"
-    yield Row("plant/dompc", f"do-mpc simulator, CVODES at 1e-6: {step}", DOMPC, "do_mpc")
     for method, rtol in (("LSODA", 1e-5), ("RK45", 1e-4)):
         title, settings = (
             f"solve_ivp, {method} at {rtol:g}: {step}",
             {"method": method, "rtol": rtol},
         )
-        yield Row(f"plant/{method}", title, SCIPY, "solve_ivp", settings)
+        yield Row(f"plant/{method}", title, OWN, "solve_ivp", settings)
 
 
 def _batches() -> Iterator[Row]:
@@ -172,12 +133,12 @@ def _batches() -> Iterator[Row]:
     for toy in ("CartPole", "Pendulum"):
         named = {"name": f"{toy}-v1"}
         looped, title = named | {"mode": "sync"}, f"SyncVectorEnv {toy}"
-        yield from _sizes(f"sync_{toy}", title, GYMNASIUM, "vector", looped, SYNC_COUNTS)
+        yield from _sizes(f"sync_{toy}", title, OWN, "vector", looped, SYNC_COUNTS)
         title = f"EnvPool {toy}"
         yield from _sizes(f"envpool_{toy}", title, ENVPOOL, "envpool", named, ENVPOOL_COUNTS)
         yield from _sizes(f"gymnax_{toy}", f"gymnax {toy}", GYMNAX, "gymnax", named, COUNTS)
     title = f"Gymnasium's array of {classic}"
-    yield from _sizes("vector_CartPole", title, GYMNASIUM, "vector", {"name": classic}, COUNTS)
+    yield from _sizes("vector_CartPole", title, OWN, "vector", {"name": classic}, COUNTS)
 
 
 def _sizes(
@@ -190,15 +151,14 @@ def _sizes(
 ) -> Iterator[Row]:
     for count in counts:
         each = {**settings, "count": count}
-        cores = each.get("threads", 1)
-        yield Row(f"batch/{key}/{count}", f"{title}, {count}", peer, make, each, cores)
+        yield Row(f"batch/{key}/{count}", f"{title}, {count}", peer, make, each)
 
 
 def _rollouts() -> Iterator[Row]:
     yield Row(
         "rollouts/Pendulum/8",
         "PPO rollouts, 8 copies of Pendulum-v1",
-        SB3,
+        OWN,
         "rollouts",
         {"name": "Pendulum-v1", "count": 8},
     )
@@ -206,7 +166,7 @@ def _rollouts() -> Iterator[Row]:
         yield Row(
             f"rollouts/own/{count}",
             f"PPO rollouts, pma-gym, batch of {count}",
-            SB3,
+            OWN,
             "rollouts",
             {"name": DISPLACEMENT, "count": count, "n_steps": 128},
         )

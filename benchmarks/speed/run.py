@@ -15,14 +15,14 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 from statistics import median, quantiles
 
-from rich.box import SIMPLE_HEAD
 from rich.console import Console
-from rich.table import Table
 
 from benchmarks.files import write_text
 from benchmarks.runner.provenance import environment_info
 from benchmarks.speed.peers import ROOT, Row, all_rows
+from pma_gym.cli.terminal import terminal_table
 from pma_gym.files import OutputError, check_output
+from pma_gym.pages.document import TextTable
 from pma_gym.terminal import SafeConsole
 
 DONE, FAILED, INTERRUPTED = 0, 1, 130
@@ -53,7 +53,6 @@ TARGETS = (
     (SINGLE, "single/InvertedPendulum", 6.0),
     (SINGLE, "single/gem_*", 30.0),
     (SINGLE, "single/pcgym", 100.0),
-    (SINGLE, "plant/dompc", 120.0),
     (BATCH, "batch/envpool_CartPole/1024", 1.8),
     ("rollouts/own/64", "rollouts/Pendulum/8", 9.0),
     ("rollouts/own/256", "rollouts/Pendulum/8", 18.0),
@@ -205,12 +204,9 @@ def ratio(target: tuple[str, str, float], rates: Rates) -> list[float]:
 def _print(
     rows: Sequence[Row], rates: Rates, absences: Mapping[str, str], console: Console
 ) -> None:
-    table = _table("Row", "What", "Steps/s", "±")
-    for row in rows:
-        values = list(rates[row.key].values())
-        if values:
-            table.add_row(row.key, row.title, rate(median(values)), spread(values))
-    console.print(table)
+    measured = [(row, list(rates[row.key].values())) for row in rows if rates[row.key]]
+    cells = [[row.key, row.title, rate(median(each)), spread(each)] for row, each in measured]
+    console.print(terminal_table(TextTable("", ("Row", "What", "Steps/s", "±"), cells, 2)))
     for key, why in absences.items():
         console.print(f"Left out: {key}: {why}", highlight=False, markup=False)
 
@@ -219,14 +215,15 @@ def _judge(
     verdicts: Sequence[tuple[tuple[str, str, float], list[float]]], console: Console
 ) -> list[tuple[str, str]]:
     """Print the ratios; returns the rows of those that are missed or not measured."""
-    table, missed = _table("Row", "Over", "At least", "Median", "±"), []
+    rows, missed = [], []
     for (own, other, least), ratios in verdicts:
         middle = median(ratios) if ratios else None
         if middle is None or middle < least:
             missed.append((own, other))
         cells = ("not measured", "") if middle is None else (f"{middle:.3g}", spread(ratios))
-        table.add_row(own, other, f"{least:g}", *cells)
-    console.print(table)
+        rows.append([own, other, f"{least:g}", *cells])
+    header = ("Row", "Over", "At least", "Median", "±")
+    console.print(terminal_table(TextTable("", header, rows, 2)))
     return missed
 
 
@@ -237,13 +234,6 @@ def _fails(missed: Sequence[tuple[str, str]], rows: Sequence[Row]) -> bool:
     for own, other in failed:
         print(f"failed: {own} over {other}: too slow, or not measured", file=sys.stderr)
     return bool(failed)
-
-
-def _table(*header: str) -> Table:
-    table = Table(box=SIMPLE_HEAD, pad_edge=False)
-    for name in header:
-        table.add_column(name, no_wrap=name != "What")
-    return table
 
 
 def spread(values: Sequence[float]) -> str:

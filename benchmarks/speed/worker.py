@@ -181,117 +181,35 @@ def _keep_one_processor() -> None:
         os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})
 
 
-def _trial(integrate: Callable[[Any, float], Any]) -> Chunk:
-    """Steps of an integrator on pma-gym's plant under random voltages (V), each held."""
-    _, rest = _plant()
+def solve_ivp(method: str, rtol: float) -> Chunk:
+    """Scipy's integrators on pma-gym's plant under random voltages, called for every control step.
+
+    The right-hand side is compiled.
+    """
+    import scipy.integrate
+
+    from pma_gym.plant.plant import Plant
+
+    plant = Plant("station")
+    rest, regulator = plant.settle(0.0, PRESSURE_PA), plant.regulator_voltage(PRESSURE_PA)
     voltages = np.random.default_rng(0).uniform(0.0, 10.0, 500).tolist()
 
     def chunk() -> int:
         state = rest.state
         for motor in voltages:
-            state = integrate(state, motor)
+            state = scipy.integrate.solve_ivp(
+                lambda _, y, motor=motor: plant.derivative(
+                    y, motor, regulator, rest.zero_contraction
+                ),
+                (0.0, PERIOD_S),
+                state,
+                method,
+                rtol=rtol,
+                atol=1e-3 * rtol,
+            ).y[:, -1]
         return len(voltages)
 
     return chunk
-
-
-def _plant() -> tuple[Any, Any]:
-    from pma_gym.plant.plant import Plant
-
-    plant = Plant("station")
-    return plant, plant.settle(0.0, PRESSURE_PA)
-
-
-def solve_ivp(method: str, rtol: float) -> Chunk:
-    """Scipy's integrators, called for every control step; the right-hand side is compiled."""
-    import scipy.integrate
-
-    plant, rest = _plant()
-    regulator, zero = plant.regulator_voltage(PRESSURE_PA), rest.zero_contraction
-
-    def integrate(state: Any, motor: float) -> Any:  # noqa: ANN401
-        return scipy.integrate.solve_ivp(
-            lambda _, y: plant.derivative(y, motor, regulator, zero),
-            (0.0, PERIOD_S),
-            state,
-            method,
-            rtol=rtol,
-            atol=1e-3 * rtol,
-        ).y[:, -1]
-
-    return _trial(integrate)
-
-
-def do_mpc() -> Chunk:
-    """do-mpc's simulator, its laws as CasADi expressions of the same text."""
-    import do_mpc as library
-
-    model = library.model.Model("continuous", "SX")
-    states = {name: model.set_variable("_x", name) for name in _plant()[0].states}
-    motor = model.set_variable("_u", "motor_voltage")
-    for name, rate in zip(states, _rates(states, motor), strict=True):
-        model.set_rhs(name, rate)
-    model.setup()
-    made = library.simulator.Simulator(model)
-    made.set_param(t_step=PERIOD_S, integration_tool="cvodes", reltol=1e-6, abstol=1e-9)
-    made.setup()
-
-    command, last = np.zeros((1, 1)), None
-
-    def integrate(state: Any, motor: float) -> Any:  # noqa: ANN401
-        nonlocal last
-        if state is not last:
-            made.x0 = state
-            # What it records of every step is copied whole in every step.
-            made.reset_history()
-        command[0, 0] = motor
-        made.make_step(command)
-        last = np.asarray(made.x0.cat).ravel()
-        return last
-
-    return _trial(integrate)
-
-
-def _rates(states: dict[str, Any], motor: Any) -> list[Any]:  # noqa: ANN401 - CasADi's symbols
-    """The rate of every state of the station, for symbols of state and voltage (V)."""
-    import operator
-
-    import casadi
-
-    from pma_gym.codegen.trace import order
-    from pma_gym.plant.program import parameter_names
-
-    plant, rest = _plant()
-    known: dict[str, Any] = {**states, "motor_voltage": motor}
-    known |= zip(parameter_names(plant.model), plant.model.vector().tolist(), strict=True)
-    known["regulator_voltage"] = plant.regulator_voltage(PRESSURE_PA)
-    known["zero_contraction"] = rest.zero_contraction
-    operations: dict[str, Callable[..., Any]] = {
-        "add": operator.add,
-        "subtract": operator.sub,
-        "multiply": operator.mul,
-        "divide": operator.truediv,
-        "negative": operator.neg,
-        "absolute": casadi.fabs,
-        "square_root": casadi.sqrt,
-        "floor": casadi.floor,
-        "less": operator.lt,
-        "less_equal": operator.le,
-        "equal": operator.eq,
-        "not_equal": operator.ne,
-        "and": casadi.logic_and,
-        "or": casadi.logic_or,
-        "not": casadi.logic_not,
-        "select": casadi.if_else,
-    }
-    rates, made = plant.program.rates(), {}
-    for value in order(rates):
-        if value.operands:
-            parts = [made[part.id] for part in value.operands]
-            made[value.id] = operations[value.operation](*parts)
-        else:
-            made[value.id] = value.data if value.is_constant else known[value.data]
-    return [made[value.id] for value in rates]
 
 
 def rollouts(name: str, count: int, **options: Any) -> Chunk:

@@ -182,7 +182,10 @@ class ReproductionSuite(FrozenSuite):
         }
         for pressure in pressures:
             if not any(pressure in left for left in trials.values()):
-                known = "; ".join(f"{t}: {_list(self.pressures_kpa[t])}" for t in trials)
+                known = "; ".join(
+                    f"{task}: {', '.join(f'{each:g}' for each in self.pressures_kpa[task])}"
+                    for task in trials
+                )
                 raise SuiteError(
                     f"the dissertation has no trial at {pressure:g} kPa to compare with ({known})"
                 )
@@ -210,7 +213,3 @@ def _distinct(controllers: Sequence[ControllerSpec]) -> tuple[ControllerSpec, ..
         else controller
         for controller in by_name.values()
     )
-
-
-def _list(pressures: Sequence[float]) -> str:
-    return ", ".join(f"{pressure:g}" for pressure in pressures)

@@ -23,7 +23,6 @@ from pma_gym.engine.observation import BOUND
 from pma_gym.envs import PMAVectorEnv, StationInfo
 from pma_gym.plant.model import load_model
 from pma_gym.sb3 import EngineVecEnv
-from pma_gym.units import SI_FACTORS
 
 if TYPE_CHECKING:
     from stable_baselines3.common.vec_env import VecEnv
@@ -254,10 +253,3 @@ def _row(task: str, info: dict[str, Any], failed: bool) -> dict[str, Any]:
         "failure": "a limit" if failed else "",
         "phases": {name: {"rmse": info[f"rmse_{name}_{schedule.suffix}"]} for name in phases},
     }
-
-
-def unit_of(task: str) -> str:
-    """Unit of a task's errors: mm, deg or N m."""
-    unit = task_of(task).schedule.unit
-    assert unit in SI_FACTORS
-    return unit

@@ -4,11 +4,13 @@ Averages a policy's weights while it is trained: what exploration leaves restles
 """
 
 import ast
-import copy
+import io
 import time
+import zipfile
 from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
 from dataclasses import asdict, dataclass
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -20,10 +22,11 @@ from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.callbacks import BaseCallback, CallbackList
 from stable_baselines3.common.logger import configure
 from stable_baselines3.common.noise import NormalActionNoise
+from stable_baselines3.common.save_util import load_from_zip_file
 from stable_baselines3.common.utils import LinearSchedule
 from stable_baselines3.common.vec_env import VecEnv
 
-from benchmarks.training.checkpoint import load_checkpoint, save_checkpoint
+from benchmarks.files import reason
 from benchmarks.training.policy_batch import (
     Point,
     training_environments,
@@ -31,6 +34,8 @@ from benchmarks.training.policy_batch import (
     validation_environments,
 )
 from benchmarks.training.preset import Preset, PresetError
+from pma_gym.documents import parse_json
+from pma_gym.files import replace_files
 
 SPANS = 7.0
 """How many spans before the training's end the average begins, if the training is so long."""
@@ -166,6 +171,10 @@ def _literal(node: ast.expr) -> Any:  # noqa: ANN401
     return ast.literal_eval(node)
 
 
+class CheckpointError(ValueError):
+    """A checkpoint that cannot be saved or used; the message says why and what remains."""
+
+
 def train(order: Order, out: Path, on_progress: OnProgress) -> Trained:
     """Train a policy, or go on with a training that was interrupted.
 
@@ -180,57 +189,55 @@ def train(order: Order, out: Path, on_progress: OnProgress) -> Trained:
     """
     preset = order.preset
     torch.set_num_threads(order.threads)
+    formats = ["csv", "tensorboard"] if find_spec("tensorboard") else ["csv"]
     with (
         closing(training_environments(preset, order.threads)) as envs,
         closing(validation_environments(preset, order.threads)) as checks,
-        closing(configure(str(out / "log"), _formats())) as log,
+        closing(configure(str(out / "log"), formats)) as log,
     ):
         model = learner(preset, envs, order.seed)
         model.set_logger(log)
-        watch = _Watch(order, checks, out / "checkpoint.zip", on_progress)
+        watch = _Watch(order, checks, out, on_progress)
         watch.resume(model)
         left = preset.n_timesteps - model.num_timesteps
         if left > 0:
             callbacks = CallbackList([watch.average, watch])
             model.learn(left, callback=callbacks, reset_num_timesteps=False)
-        model.policy.load_state_dict(watch.best)
-    return Trained(model, watch.curve, min(watch.curve, key=lambda point: point.mean))
-
-
-def _formats() -> list[str]:
-    try:
-        import tensorboard  # noqa: F401
-    except ImportError:
-        return ["csv"]
-    return ["csv", "tensorboard"]
+        _, until_best = _load(watch.best, model)
+    return Trained(model, watch.curve, until_best[-1])
 
 
 class _Watch(BaseCallback):
-    """Validates, keeps the best weights, saves, tells of progress."""
+    """Validates, saves the model and its best weights as Stable-Baselines3 does, tells of progress.
 
-    def __init__(self, order: Order, checks: VecEnv, path: Path, on_progress: OnProgress) -> None:
+    Attributes:
+        best: file of the model with the weights of its best validation.
+    """
+
+    def __init__(self, order: Order, checks: VecEnv, out: Path, on_progress: OnProgress) -> None:
         super().__init__()
-        self._order, self._checks, self._path = order, checks, path
-        self._on_progress = on_progress
+        self._order, self._checks, self._on_progress = order, checks, on_progress
+        self._last, self.best = out / "checkpoint.zip", out / "best.zip"
         self.average = WeightAverage(order.preset.average_share)
         self.curve: list[Point] = []
-        self.best: dict[str, Any] = {}
         self._began = time.perf_counter()
 
-    def resume(self, model: BaseAlgorithm) -> None:
+    def resume(self, model: Any) -> None:  # noqa: ANN401 - with attributes that are saved with it
         """Put the training where its checkpoint was, if there is one."""
-        if not self._path.exists():
+        # All that moves the result.
+        order = {**asdict(self._order.preset), "seed": self._order.seed}
+        model.order, model.curve = order | {"threads": self._order.threads}, self.curve
+        if not (self._last.exists() and self.best.exists()):
             return
-        loaded = load_checkpoint(self._path, model, self._to_json())
-        self.curve, self.best, self.average.weights = loaded
-        self._began -= self.curve[-1].wall_s
+        steps, curve = _load(self._last, model)
+        model.num_timesteps = steps
+        self.curve += curve
+        self._began -= curve[-1].wall_s
+        if hasattr(model, "learning_starts"):
+            # What is replayed is collected anew.
+            model.learning_starts += steps
         # What comes now is drawn anew, not as it was at the beginning.
-        model.set_random_seed(self._order.seed + model.num_timesteps)
-
-    def _to_json(self) -> dict[str, Any]:
-        """All that moves the result."""
-        order = self._order
-        return {**asdict(order.preset), "seed": order.seed, "threads": order.threads}
+        model.set_random_seed(self._order.seed + steps)
 
     def _on_step(self) -> bool:
         return True
@@ -246,14 +253,58 @@ class _Watch(BaseCallback):
             self._validate()
 
     def _validate(self) -> None:
+        files: dict[Path, bytes] = {}
         with self.average.applied():
             wall_s = round(time.perf_counter() - self._began, 3)
             point = validate(self.model, self._checks, self._order.preset.task, wall_s)
-            if all(point.mean < earlier.mean for earlier in self.curve):
-                self.best = copy.deepcopy(self.model.policy.state_dict())
-        self.curve.append(point)
-        content = {"order": self._to_json(), "curve": self.curve}
-        save_checkpoint(
-            self._path, self.model, content, {"best": self.best, "average": self.average.weights}
-        )
+            best = all(point.mean < earlier.mean for earlier in self.curve)
+            self.curve.append(point)
+            if best:
+                files[self.best] = _saved(self.model)
+        try:
+            replace_files(files | {self._last: _saved(self.model)})
+        except OSError as error:
+            raise CheckpointError(
+                f"{self._last} cannot be saved: {error}; the checkpoint before it stays; make room "
+                "or allow writing, then run the same command again: it goes on from there"
+            ) from error
         self._on_progress(point.steps, point)
+
+
+def _saved(model: BaseAlgorithm) -> bytes:
+    file = io.BytesIO()
+    model.save(file)
+    return file.getvalue()
+
+
+def _load(path: Path, model: Any) -> tuple[int, list[Point]]:  # noqa: ANN401 - with its order
+    """Give a model the weights that were saved: nothing of the file is unpickled or executes.
+
+    Returns:
+        Control steps and curve up to there.
+    Raises:
+        CheckpointError: a damaged file, or another training's.
+    """
+    try:
+        with zipfile.ZipFile(path) as archive:
+            data: Any = parse_json(archive.read("data"), str(path), finite=False)
+        other = [
+            f"{key} was {data['order'][key]}, is {value}"
+            for key, value in model.order.items()
+            if data["order"][key] != value
+        ]
+        if not other:
+            _, parameters, variables = load_from_zip_file(path, load_data=False)
+            model.set_parameters(parameters)
+            for name, tensor in (variables or {}).items():
+                getattr(model, name).data.copy_(tensor)
+            return int(data["num_timesteps"]), [Point(*point) for point in data["curve"]]
+    # Whatever a damaged file holds.
+    except Exception as error:
+        raise CheckpointError(
+            f"{path} is damaged ({reason(error)}); delete it to train from the beginning"
+        ) from error
+    raise CheckpointError(
+        f"{path} is of another training: {'; '.join(other)}; give another --out, or delete that "
+        "file"
+    )

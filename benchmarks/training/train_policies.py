@@ -16,9 +16,10 @@ from rich.progress import (
     TimeRemainingColumn,
 )
 
+from benchmarks.report.errors import task_of
 from benchmarks.runner.provenance import ROOT, git_state
 from benchmarks.training.export import weights_from_state
-from benchmarks.training.policy_batch import Point, unit_of
+from benchmarks.training.policy_batch import Point
 from benchmarks.training.preset import Preset, PresetError, load_preset
 from benchmarks.training.run import Order, train
 from benchmarks.training.stations import TRAINING, VALIDATION
@@ -79,7 +80,7 @@ def policy_of(
             "wall_s": round(curve[-1].wall_s, 1),
             "code": str(state["commit"])[:12] + ("+" if state["dirty"] else ""),
             "curve": [[point.steps, point.wall_s, point.error] for point in curve],
-            "scores": {"validation": {**validated, "unit": unit_of(preset.task)}},
+            "scores": {"validation": {**validated, "unit": task_of(preset.task).schedule.unit}},
         },
     )
 
@@ -189,7 +190,7 @@ def run_train(order: Order, out: Path, console: Console, ship: bool = False) -> 
         CheckpointError: see `train`.
     """
     out.mkdir(parents=True, exist_ok=True)
-    preset, unit = order.preset, unit_of(order.preset.task)
+    preset, unit = order.preset, task_of(order.preset.task).schedule.unit
     columns = (
         TextColumn("{task.description}", markup=False),
         BarColumn(),

@@ -5,11 +5,12 @@ from collections import Counter
 from functools import cache
 from importlib import resources
 
+from benchmarks.dissertation import counts_table
 from generators.text import code, number, table
 from pma_gym.data.serres2008 import corrections, pressures
 from pma_gym.data.signals import SIGNALS
 from pma_gym.data.trial_columns import COLUMNS, RAW_COLUMNS
-from pma_gym.studies import VERDICTS, Comparison, compare_all
+from pma_gym.studies import Comparison, compare_all
 from pma_gym.studies.voltage_profile import profile_model
 from pma_gym.units import SI_FACTORS
 
@@ -37,13 +38,8 @@ def misprints() -> str:
 
 def verdicts() -> str:
     """Tabulate figures of each study that are equal, rounded and misprinted."""
-    rows = []
-    for study in dict.fromkeys(row.study for row in _compared()):
-        counts = Counter(row.verdict for row in _compared() if row.study == study)
-        rows.append([study, *(counts[name] for name in VERDICTS)])
-    total = Counter(row.verdict for row in _compared())
-    rows.append(["all", *(total[name] for name in VERDICTS)])
-    return table(["Study", *VERDICTS], rows, right=(1, 2, 3))
+    counts = counts_table(_compared())
+    return table(counts.header, counts.rows, right=(1, 2, 3))
 
 
 def wrong_in_print() -> str:
@@ -72,11 +68,6 @@ def _compared() -> tuple[Comparison, ...]:
 _TIME = "since the start; required, strictly increasing"
 
 
-def _meaning(quantity: str) -> str:
-    """What a column holds, in words."""
-    return SIGNALS[quantity].meaning if quantity in SIGNALS else _TIME
-
-
 def columns() -> str:
     """The columns of a trial's file."""
     rows = [
@@ -84,7 +75,7 @@ def columns() -> str:
             code(column.name),
             column.unit,
             column.kind,
-            _meaning(column.quantity),
+            SIGNALS[column.quantity].meaning if column.quantity in SIGNALS else _TIME,
             "" if column.limits is None else f"{column.limits[0]:g} to {column.limits[1]:g}",
         ]
         for column in COLUMNS

@@ -37,29 +37,14 @@ def hidden_summary() -> str:
     return diagnosis()
 
 
-def hidden_cases(block: str) -> str:
-    """What was hidden in a block and what was said."""
-    return _own(block, "What was hidden")
-
-
-def hidden_sizes(block: str) -> str:
-    """Errors of fitted sizes of a block, and how often intervals cover the truth."""
-    return _own(block, "Fitted sizes")
-
-
-def hidden_rounds() -> str:
-    """How soon proposed and random experiments settle what data could not tell."""
-    return _own("undecidable", "Rounds")
-
-
-def _own(block: str, title: str) -> str:
+def hidden_table(block: str, *title: str) -> str:
     """The table of a block whose title begins so, as the report has it."""
     document = _read("hidden-effects")
     alone = {**document, "blocks": {block: document["blocks"][block]}}
     tables = [
         each
         for each in report_blocks(alone)
-        if isinstance(each, TextTable) and each.title.startswith(title)
+        if isinstance(each, TextTable) and each.title.startswith(" ".join(title))
     ]
     return to_markdown(tables, {}, "") + _measured(block)
 
@@ -78,16 +63,6 @@ def hidden_measured(*some: str) -> str:
     """
     names = ("commit", "date", "method")
     return measured_text(dict(zip(names, each.split("/"), strict=True)) for each in some)
-
-
-def hidden_kinds() -> str:
-    """What was said of each kind of data that excite too little."""
-    return _own("undecidable", "By kind")
-
-
-def hidden_parameters() -> str:
-    """How often each base parameter that was off was named, and what was where it was not."""
-    return _own("parameters", "By parameter")
 
 
 def hidden_seconds() -> str:

@@ -13,12 +13,20 @@ from rich.table import Table
 from rich.text import Text
 
 from pma_gym.cli.options import JsonOption
-from pma_gym.cli.terminal import console, model_names, print_json, say, warnings_said
+from pma_gym.cli.terminal import (
+    console,
+    model_names,
+    print_json,
+    print_table,
+    say,
+    warnings_said,
+)
 from pma_gym.data.datasets.dataset import read_dataset
 from pma_gym.data.datasets.dataset_toml import DESCRIPTION, Description
 from pma_gym.data.datasets.drafting import SeenColumn, draft, one_line, seen_columns
 from pma_gym.data.trial_columns import TrialError
 from pma_gym.files import OutputError, replace_file
+from pma_gym.pages.document import TextTable
 from pma_gym.plant.model import Model, load_model
 from pma_gym.plant.sensors import quantities
 
@@ -170,9 +178,6 @@ def compare(
     if as_json:
         print_json({"model": compared.name, "misfit_rms": sizes})
         return
-    table = Table("signal", title=f"Misfit of {compared.name} (rms)", title_justify="left")
-    table.add_column("misfit", justify="right")
-    table.add_column("unit")
-    for signal, size in sizes.items():
-        table.add_row(signal_name(signal), figure(size), signal_unit(signal))
-    console().print(table)
+    rows = [[signal_name(name), signal_unit(name), figure(size)] for name, size in sizes.items()]
+    title = f"Misfit of {compared.name} (rms)"
+    print_table(TextTable(title, ("signal", "unit", "misfit"), rows, 2))

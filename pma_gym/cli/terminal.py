@@ -36,12 +36,25 @@ def console() -> SafeConsole:
     return table_console()
 
 
-def print_table(table: TextTable) -> None:
-    """Print a table on the terminal."""
-    shown = Table(*table.header, title=table.title)
+_SHORT = 18
+"""Characters of the longest cell of a column that is never broken."""
+
+
+def terminal_table(table: TextTable) -> Table:
+    """A table for the terminal, as narrow as may be."""
+    shown = Table(title=table.title or None, title_justify="left", box=None, padding=(0, 1, 0, 0))
+    for column, name in enumerate(table.header):
+        justify = "left" if column < table.words else "right"
+        short = all(len(row[column]) <= _SHORT for row in table.rows)
+        shown.add_column(name.replace(" | ", "\n"), justify=justify, no_wrap=short)
     for row in table.rows:
         shown.add_row(*row)
-    console().print(shown)
+    return shown
+
+
+def print_table(table: TextTable) -> None:
+    """Print a table on the terminal."""
+    console().print(terminal_table(table))
 
 
 def print_json(document: object) -> None:
@@ -149,17 +162,17 @@ def model_document(model: Model) -> dict[str, Any]:
 def print_installation(console: Console) -> None:
     """Versions, shipped models and registered environments."""
     known = installation()
-    versions = Table("package", "version", title="Versions", title_justify="left")
-    for package in known["versions"].items():
-        versions.add_row(*package)
-    models = Table("model", "plant", "what", title="Models", title_justify="left")
-    for model in known["models"]:
-        models.add_row(*model.values())
-    environments = Table("environment", "task", title="Environments", title_justify="left")
-    for environment in known["environments"]:
-        environments.add_row(*environment.values())
-    for table in (versions, models, environments):
-        console.print(table)
+    tables = (
+        TextTable("Versions", ("package", "version"), list(known["versions"].items()), 2),
+        TextTable("Models", ("model", "plant", "what"), _rows(known["models"]), 3),
+        TextTable("Environments", ("environment", "task"), _rows(known["environments"]), 2),
+    )
+    for table in tables:
+        console.print(terminal_table(table))
+
+
+def _rows(documents: list[dict[str, str]]) -> list[list[str]]:
+    return [list(each.values()) for each in documents]
 
 
 def print_model(model: Model, console: Console) -> None:

@@ -42,7 +42,9 @@ def station_within_intervals(model: Model, generator: np.random.Generator) -> Mo
             drawn[path] = _bounded(model, path, note.low + share * (note.high - note.low))
     drawn = _brought_back(model, drawn, "muscle_force", _pulling_as(model))
     drawn = _brought_back(model, drawn, "regulator_line", _reaches_highest_pressure)
-    drawn = _brought_back(model, drawn, "drive", _lets_go)
+    drawn = _brought_back(
+        model, drawn, "drive", lambda drawn: drawn.parameters["drive"].offset <= 0.0
+    )
     return model.replace(drawn)
 
 
@@ -81,10 +83,6 @@ def _pulling_as(nominal: Model) -> Callable[[Model], bool]:
 def _reaches_highest_pressure(drawn: Model) -> bool:
     line = drawn.parameters["regulator_line"]
     return all(10.0 * line.gain + line.offset >= task.highest_pressure for task in TASKS.values())
-
-
-def _lets_go(drawn: Model) -> bool:
-    return drawn.parameters["drive"].offset <= 0.0
 
 
 VARIATION = 0.2

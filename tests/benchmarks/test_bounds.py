@@ -1,10 +1,9 @@
-"""Achievable bounds of a page: as few as are needed, computed beside it, kept for the next."""
+"""Achievable bounds of a page: as few as are needed, kept for the next."""
 
 import numpy as np
 import pytest
 
 from benchmarks.bounds import BOUNDS, Bounds
-from benchmarks.executors.local import Background
 from benchmarks.report.verdicts import largest_excess
 
 
@@ -34,13 +33,8 @@ def refuses(model, task, kpa):
     raise AssertionError("it was computed again")
 
 
-@pytest.mark.campaign
-@pytest.mark.parametrize("started", [False, True])
-def test_a_bound_is_computed_once_and_kept(started, tmp_path):
-    with Bounds("station", tmp_path, table) as bounds:
-        if started:
-            bounds.start([("rotation", 300.0), ("rotation", 400.0)])
-        assert bounds("rotation", 300.0) == 0.3
+def test_a_bound_is_computed_once_and_kept(tmp_path):
+    assert Bounds("station", tmp_path, table)("rotation", 300.0) == 0.3
     kept = Bounds("station", tmp_path, refuses)
     assert kept("rotation", 300.0) == 0.3
     # Of another model nothing is known.
@@ -52,12 +46,3 @@ def test_a_bound_is_computed_once_and_kept(started, tmp_path):
 def test_a_damaged_file_of_bounds_counts_as_none(content, tmp_path):
     (tmp_path / BOUNDS).write_text(content)
     assert Bounds("station", tmp_path, table)("rotation", 500.0) == 0.5
-
-
-def fails():
-    raise ValueError("no such trial")
-
-
-def test_work_in_the_background_raises_where_its_result_is_asked_for():
-    with Background(fails) as work, pytest.raises(ValueError, match="no such trial"):
-        work.result()

@@ -115,10 +115,10 @@ def test_it_stands_beside_the_others(tmp_path):
     add = ("add", spec.source, "--results", str(tmp_path / "results"))
     done = invoke(tmp_path, *add)
     assert done.exit_code == 0, done.output
-    assert "small version 1: 6 cases of My own, 0 of them done before" in done.stdout
+    assert "Suite small version 1:" in done.stdout and "controllers: 6 cases" in done.stdout
     assert "displacement: " in done.stdout and "rank 2 of 2" in done.stdout
     again = invoke(tmp_path, *add)
-    assert "6 of them done before" in again.stdout and "rank 2 of 2" in again.stdout
+    assert "6 cases are done in" in again.stdout and "rank 2 of 2" in again.stdout
 
 
 @pytest.mark.campaign

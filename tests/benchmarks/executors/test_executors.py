@@ -168,7 +168,7 @@ ORPHANS = """
 import sys
 from functools import partial
 from pathlib import Path
-from benchmarks.executors.executor import ExecutorName, executor_named
+from benchmarks.executors.choice import ExecutorName, executor_named
 from benchmarks.executors.executor import run_all
 from tests.benchmarks.executors.pieces import sleeps
 

@@ -1,4 +1,4 @@
-"""The chain that makes anew what depends on the station: order, resumption, old and new figures."""
+"""The chain that makes anew what depends on the station: order and resumption."""
 
 import io
 
@@ -7,20 +7,19 @@ from rich.console import Console
 from typer.testing import CliRunner
 
 from benchmarks.__main__ import app
-from benchmarks.remake import TABLE, Remake, compared, figures
+from benchmarks.remake import Remake
 from benchmarks.remake_steps import MODEL, Step, chain, content
 from benchmarks.suites.versions import model_digest, raise_versions
 
 
 class Machine:
-    """Runs commands by writing them down; one of them may fail, or change a figure."""
+    """Runs commands by writing them down; one of them may fail."""
 
     def __init__(self, fails=()):
-        self.ran, self.fails, self.figures = [], set(fails), {"rmse": 1.0, "gain": 2.0}
+        self.ran, self.fails = [], set(fails)
 
     def run(self, words):
         self.ran.append(words)
-        self.figures["rmse"] = 0.5
         return 3 if words in self.fails else 0
 
 
@@ -35,9 +34,9 @@ def remake(tmp_path):
 
     def made(machine):
         shown = Console(file=io.StringIO(), width=100)
-        return Remake(steps, tmp_path / "out", shown, machine.run, lambda: dict(machine.figures))
+        return Remake(steps, tmp_path / "out", shown, machine.run)
 
-    made.ground, made.table = ground, tmp_path / "out" / TABLE
+    made.ground = ground  # type: ignore[attr-defined]
     return made
 
 
@@ -65,24 +64,11 @@ def test_other_grounds_are_made_anew(remake):
     assert [step.name for step in remake(machine).left()] == ["gains", "scores"]
 
 
-def test_the_table_has_what_moved_since_the_chain_began(remake):
-    remake(Machine()).go()
-    assert "rmse\t1\t0.5\t-50.0 %" in remake.table.read_text(encoding="utf-8")
-    assert "gain" not in remake.table.read_text(encoding="utf-8")
-
-
-def test_what_appears_or_goes_is_told_too():
-    assert compared({"a": 1.0}, {"b": 2.0}) == [("a", "1", "", ""), ("b", "", "2", "")]
-
-
-def test_the_chain_names_files_that_are_there_and_shipped_figures():
+def test_the_chain_names_files_that_are_there():
     steps = chain()
     assert [step.name for step in steps][:4] == ["identify", "suites", "gains", "designs"]
     assert all(content(path) for step in steps[:5] for path in step.depends)
     assert MODEL in steps[2].depends and steps[2].digest != steps[3].digest
-    scores = figures()
-    assert scores["station: hysteresis.memory_at_start"] == pytest.approx(0.733, abs=0.01)
-    assert any(name.startswith("policy displacement-100hz-ppo") for name in scores)
 
 
 def test_another_model_gives_every_suite_a_new_version_once(tmp_path):
