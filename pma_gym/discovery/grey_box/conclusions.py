@@ -71,11 +71,12 @@ class Conclusions:
     def last(self) -> Hypothesis:
         """The hypothesis that is proposed.
 
-        The last that predicts trials left out no worse than the one before.
+        The last whose effects are surely of some size, and which predicts trials left out no worse.
         """
         best = self.path[0]
         for each in self.path[1:]:
-            if self.misfit(each) <= self.misfit(best) * (1.0 + 1e-3):
+            sized = all(self._is_sized(each, move) for move in each.moves)
+            if sized and self.misfit(each) <= self.misfit(best) * (1.0 + 1e-3):
                 best = each
         return best
 
@@ -181,10 +182,19 @@ class Conclusions:
         row = self.selection.span / self.selection.stride / self.selection.block
         if late < max(ROWS_LATE * row, CONFIDENCE * error):
             return 0.0
-        prompt = [c for c in last.fit.coordinates if c.name != "delay"]
-        made = fit(last.box, replace(last.fit.point, delay=0.0), prompt, last.fit.tied)
-        price = self.selection.price(last, replace(last, fit=made)) + np.log(len(self.candidates))
-        return max(0.0, last.fit.value - made.value - float(price))
+        price = np.log(len(self.candidates)) + self.selection.price_of(last, 1)
+        return max(0.0, last.fit.value - self._prompt - float(price))
+
+    @property
+    def _prompt(self) -> float:
+        """Log likelihood without a delay, with commands held or linear between rows."""
+        last, values = self.last, []
+        prompt = tuple(c for c in last.fit.coordinates if c.name != "delay")
+        start = replace(last.fit, point=replace(last.fit.point, delay=0.0), coordinates=prompt)
+        for linear in (False, True):
+            made = self.selection.hold_fits(start, last.box.model, linear, last.box.rows[0].steps)
+            values += [each.value for each in made]
+        return max(values)
 
     @property
     def delayed(self) -> bool:
@@ -196,7 +206,7 @@ class Conclusions:
         """See `pma_gym.discovery.diagnosis.Verdict`."""
         effects = self.delayed or any(move.candidate for move in self.last.moves)
         material = self.share(self.last) > MATERIAL and self.is_latent
-        if not all(map(self._is_sized, self.last.moves)):
+        if not self.last.moves and len(self.path) > 1 and self.is_latent:
             return "unknown"
         if material and (self.left > LEFT or not self.last.moves):
             return "unknown"
@@ -208,11 +218,11 @@ class Conclusions:
             return "agrees"
         return "parameters"
 
-    def _is_sized(self, move: Move) -> bool:
+    def _is_sized(self, each: Hypothesis, move: Move) -> bool:
         """Whether some size of an added effect is surely not none."""
         if move.candidate is None:
             return True
-        made, candidate = self.last.fit, move.candidate
+        made, candidate = each.fit, move.candidate
         for path, none, size in zip(
             candidate.paths, candidate.absent, candidate.amplitudes, strict=True
         ):
@@ -259,20 +269,20 @@ class Conclusions:
         )
         for each, trial, *models in curves:
             shape = (len(trial.time), len(signals))
-            measured, *drawn = (np.full(shape, np.nan) for _ in range(4))
+            measured, before, refitted, after = (np.full(shape, np.nan) for _ in range(4))
             own = {}
             for i, channel in enumerate(last.box.channels):
                 there = trial.there[:, i]
                 measured[there, channel] = trial.readings[there, i, 0]
-                for room, curve in zip(drawn, models, strict=True):
+                for room, curve in zip((before, refitted, after), models, strict=True):
                     room[:, channel] = curve[:, i]
                 column = BY_QUANTITY[signals[channel].name]
-                off = [
+                first, second, third = (
                     _rms(curve[there, i] - trial.readings[there, i, 0]) / SI_FACTORS[column.unit]
                     for curve in models
-                ]
+                )
                 floor = last.fit.point.deviations[i] / SI_FACTORS[column.unit]
-                own[column.name] = Gap(*off, floor, self.holds_out(last))
+                own[column.name] = Gap(first, second, third, floor, self.holds_out(last))
             columns = tuple(signal.column for signal in signals)
             held = self.holds_out(last)
             records.append(
@@ -280,7 +290,9 @@ class Conclusions:
                     each.name,
                     trial.time,
                     measured,
-                    *drawn,
+                    before,
+                    refitted,
+                    after,
                     own,
                     held,
                     each.file or each.name,
@@ -299,13 +311,7 @@ class Conclusions:
         """The amended model."""
         if self.verdict == "agrees":
             return self.selection.model
-        last = (
-            self.last
-            if self.verdict == "effect"
-            else self.path[0]
-            if not self.last.moves
-            else self.last
-        )
+        last = self.path[0] if self.verdict == "unknown" else self.last
         model = last.box.model
         if self.delayed and self.verdict == "effect":
             (late,) = [each for each in self.candidates if each.name == "drive_delay"]

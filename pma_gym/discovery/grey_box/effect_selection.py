@@ -323,7 +323,7 @@ class EffectSelection:
         if rough and len(fits) > 1:
             best = max(fits[self.linear], key=lambda each: each.value)
             for linear in fits:
-                fits[linear] += self._held(
+                fits[linear] += self.hold_fits(
                     best, self.model, linear, self.box(self.model).rows[0].steps
                 )
             self.linear = max(fits, key=lambda each: max(f.value for f in fits[each]))
@@ -668,7 +668,7 @@ class EffectSelection:
     def _readings(each: Hypothesis) -> int:
         return sum(int(trial.there.sum()) for trial in each.box.rows)
 
-    def _held(self, best: Fit, model: Model, linear: bool, steps: int) -> list[Fit]:
+    def hold_fits(self, best: Fit, model: Model, linear: bool, steps: int) -> list[Fit]:
         """Fits with commands held or linear between rows, from a fit that has them either way.
 
         A held command is a line half a row later. Friction that begins to slip too late hides
@@ -687,7 +687,7 @@ class EffectSelection:
     def _other_hold(self, now: Hypothesis) -> Hypothesis:
         """The same hypothesis, with commands between rows the other way if that is likelier."""
         steps, kinds = now.box.rows[0].steps, (bool(self.linear), not self.linear)
-        fits = [(f, k) for k in kinds for f in self._held(now.fit, now.box.model, k, steps)]
+        fits = [(f, k) for k in kinds for f in self.hold_fits(now.fit, now.box.model, k, steps)]
         made, linear = max(fits, key=lambda pair: pair[0].value)
         if made.value < now.fit.value + LIKE:
             return now
@@ -721,11 +721,14 @@ class EffectSelection:
 
         BIC's, and that of the search.
         """
-        readings = self._readings(one)
         numbers = len(one.fit.coordinates) - len(other.fit.coordinates)
         looked = len(self.candidates) + len(self.logged) * len(self.own()[0])
         moves = len(one.moves) - len(other.moves)
-        return 0.5 * numbers * np.log(readings) + moves * np.log(looked)
+        return self.price_of(one, numbers) + moves * np.log(looked)
+
+    def price_of(self, each: Hypothesis, numbers: int) -> float:
+        """Log likelihood that so many further numbers must gain (BIC)."""
+        return 0.5 * numbers * float(np.log(self._readings(each)))
 
     def run(self) -> list[Hypothesis]:
         """From the model as it came to the last hypothesis that is worth its price."""

@@ -104,9 +104,6 @@ INERTIA = {"slide": "slide.mass_kg", "joint": "inertia.inertia_kg_m2"}
 NEAR = {"slide": 10.0, "joint": 0.1}
 """Presliding distance, in its file unit; the simulator's friction has none."""
 
-HELD = "the fit of held commands ends below that of lines half a row later, which it calls a delay"
-LATE = pytest.mark.xfail(strict=True, reason=HELD)
-
 
 @cache
 def diagnosed(plant, presliding, **kind):
@@ -123,8 +120,8 @@ def inertia_of(diagnosis, plant):
     ("plant", "begin"),
     [
         pytest.param("slide", 0.0, marks=pytest.mark.campaign),
-        pytest.param("slide", 1.37, marks=LATE),
-        pytest.param("joint", 0.0, marks=LATE),
+        ("slide", 1.37),
+        ("joint", 0.0),
         ("joint", 1.37),
     ],
 )
@@ -154,7 +151,7 @@ def test_a_drive_that_weakens_from_trial_to_trial_is_said_with_its_size():
 
 
 @pytest.mark.campaign
-@pytest.mark.parametrize("plant", [pytest.param("slide", marks=LATE), "joint"])
+@pytest.mark.parametrize("plant", ["slide", "joint"])
 def test_dry_friction_that_the_model_lacks_is_named_with_its_size(plant):
     diagnosis = diagnosed(plant, None)
     sizes = {effect.name: effect.parameters for effect in diagnosis.effects}
