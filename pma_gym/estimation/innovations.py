@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from pma_gym.codegen.machine.control import Module
 from pma_gym.codegen.machine.native import compiled, simd_lanes
 from pma_gym.effects.effect import Effect
+from pma_gym.effects.ports import SENSOR_DELAY
 from pma_gym.effects.slide.coulomb_friction import friction_path
 from pma_gym.estimation.logged import Logged
 from pma_gym.integrator.filter_kernel import FilterEquations, parameter_slots, write_filter
@@ -349,6 +350,12 @@ class GreyBox:
         where = {signals[channel].name: i for i, channel in enumerate(self.channels)}
         first, motion, spread = trial.begin(where.get(position), where.get(speed))
         level = 2.0 * point.deviations[where[position]] if position in where else 0.0
+        late = [
+            e.name for e in self.model.effects.values() if e.port == f"{SENSOR_DELAY}{position}"
+        ]
+        # A late reading in motion is not where the rig is, and its ladder is not at rest.
+        way = abs(motion) * sum(point.numbers[f"{name}.delay"] for name in late)
+        level = float(np.hypot(level, way))
         at = {
             position: (first, level),
             SPEEDS[plant]: (motion, spread),
@@ -358,14 +365,20 @@ class GreyBox:
             f"lag_{signals[0].sensor}": (first, level),
             f"lag_{signals[1].sensor}": (motion, spread),
         }
+        asked = self.asked(trial.first), 0.0
+        into = {
+            "drive_delay": asked,
+            "drive_lag": asked,
+            f"{SENSOR_DELAY}{position}": (first, level),
+            f"{SENSOR_DELAY}{speed}": (motion, spread),
+        }
         for effect in self.model.effects.values():
-            for name in effect.memory_names:
-                late = effect.port in ("drive_delay", "drive_lag")
-                at[name] = (
-                    (self.asked(trial.first), 0.0)
-                    if late
-                    else (0.0, BRISTLE if effect.rate_independent_law else 0.0)
-                )
+            for number, name in enumerate(effect.memory_names, 1):
+                # At rest the even states of a delay's ladder are what goes into it, the odd ones 0.
+                passed = effect.port in into and (effect.memories == 1 or number % 2 == 0)
+                odd = way if effect.port == f"{SENSOR_DELAY}{position}" else 0.0
+                bristle = 0.0, BRISTLE if effect.rate_independent_law else odd
+                at[name] = into[effect.port] if passed else bristle
         pairs = [at.get(name, (0.0, 0.0)) for name in states]
         covariance = np.diag([deviation**2 for _, deviation in pairs])
         return np.concatenate(
@@ -393,15 +406,17 @@ def counted(rows: Rows, counts: NDArray[np.bool_]) -> Rows:
 
 
 def predictions(box: GreyBox, point: Point, horizon: float) -> list[Array]:
-    """What a filter expects a horizon ahead.
+    """What a filter expects a horizon ahead, shape (rows, signals) each.
 
-    Each window (s) from the readings of the one before; shape (rows, signals) each.
+    Each window (s) from the readings of the one before; the first has none before it, and is NaN.
     """
     expected = []
-    windows = [((trial.time - trial.time[0]) / horizon).astype(int) % 2 == 0 for trial in box.rows]
+    numbers = [((trial.time - trial.time[0]) / horizon).astype(int) for trial in box.rows]
+    windows = [number % 2 == 0 for number in numbers]
     for odd in (False, True):
         rows = [
-            counted(trial, window != odd) for trial, window in zip(box.rows, windows, strict=True)
+            counted(trial, (window != odd) | (number == 0))
+            for trial, window, number in zip(box.rows, windows, numbers, strict=True)
         ]
         results = box.innovations([point], rows)
         expected.append(
@@ -411,8 +426,8 @@ def predictions(box: GreyBox, point: Point, horizon: float) -> list[Array]:
             ]
         )
     return [
-        np.where(window[:, None], late, early)
-        for window, early, late in zip(windows, *expected, strict=True)
+        np.where((number == 0)[:, None], np.nan, np.where(window[:, None], late, early))
+        for number, window, early, late in zip(numbers, windows, *expected, strict=True)
     ]
 
 

@@ -156,4 +156,5 @@ def test_predictions_of_a_window_do_not_know_its_readings():
         for made in (box([trial], slide()), box([other], slide()))
     )
     off = np.abs(after - before)[:, 0]
-    assert off[window % 2 == 0].max() < 1e-12 and off[window == 3].max() > 1e-4
+    assert np.isnan(off[window == 0]).all()
+    assert np.nanmax(off[window % 2 == 0]) < 1e-12 and off[window == 3].max() > 1e-4

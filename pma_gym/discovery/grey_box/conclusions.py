@@ -127,7 +127,7 @@ class Conclusions:
             ((curve - trial.readings[:, :, 0]) / self.selection.noise)[trial.there]
             for curve, trial in zip(self.curves(each), each.box.rows, strict=True)
         ]
-        return float(np.sqrt(np.mean(np.concatenate(parts) ** 2)))
+        return _rms(np.concatenate(parts))
 
     @cached_property
     def given(self) -> list[Array]:
@@ -479,4 +479,4 @@ def _unit(path: str) -> str:
 
 
 def _rms(off: Array) -> float:
-    return float(np.sqrt(np.mean(off**2)))
+    return float(np.sqrt(np.nanmean(off**2)))
