@@ -402,7 +402,7 @@ class Conclusions:
     def _chance(self, move: Move) -> float:
         """Bound of the chance of such a gain over all that was looked for."""
         gain = self.selection.gains.get(move.name, 0.0)
-        return float(min(1.0, len(self.candidates) * np.exp(-min(gain, 600.0))))
+        return float(min(1.0, len(self.candidates) * np.exp(-np.clip(gain, 0.0, 600.0))))
 
     @cached_property
     def parameters(self) -> dict[str, Moved]:
