@@ -69,7 +69,16 @@ class Conclusions:
 
     @cached_property
     def last(self) -> Hypothesis:
-        """The hypothesis that is proposed.
+        """The hypothesis that is proposed, without a delay that is not worth its price."""
+        chosen = self._chosen
+        prompt = [c for c in chosen.fit.coordinates if c.name != "delay"]
+        made = fit(chosen.box, replace(chosen.fit.point, delay=0.0), prompt, chosen.fit.tied)
+        least = chosen.fit.value - self.selection.price_of(chosen, 1) - LIKE
+        return replace(chosen, fit=made) if made.value > least else chosen
+
+    @cached_property
+    def _chosen(self) -> Hypothesis:
+        """The hypothesis that is proposed, with a delay.
 
         The last whose effects are surely of some size, and which predicts trials left out no worse.
         """
