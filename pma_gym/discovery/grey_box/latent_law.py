@@ -12,6 +12,9 @@ from pma_gym.estimation.smoother import Smoothed
 from pma_gym.plant.rigs.rig import Rig
 from pma_gym.units import SI_FACTORS
 
+FORCES = {"slide": ("force on the slide", "N"), "joint": ("torque on the joint", "N m")}
+"""What a latent force is, and its unit, by rig."""
+
 BINS, LEAST_BINS = 12, 3
 """Of a law that is drawn from the smoothed force, and the fewest that make one."""
 
@@ -43,10 +46,12 @@ def latent_law(trials: Sequence[Smoothed], rig: Rig) -> ResidualLaw | None:
     if best is None:
         return None
     explained, column, at, mean, wide = best
-    what = "torque on the joint (N m)" if rig.name == "joint" else "force on the slide (N)"
+    what, unit = FORCES[rig.name]
     name, share = signal_name(column.name), percent(max(explained, 0.0))
     words = f"goes with {name}: that explains {share} of its mean square"
-    return ResidualLaw(what, f"{name} ({column.unit})", at, mean, mean - wide, mean + wide, words)
+    return ResidualLaw(
+        f"{what} ({unit})", f"{name} ({column.unit})", at, mean, mean - wide, mean + wide, words
+    )
 
 
 def largest_share(trials: Sequence[Smoothed]) -> tuple[int, float]:

@@ -1,7 +1,7 @@
 """The verdict of a free rig as a person would say it."""
 
 from pma_gym.discovery.grey_box.conclusions import Conclusions, path_of, quantity_of
-from pma_gym.discovery.grey_box.latent_law import largest_share
+from pma_gym.discovery.grey_box.latent_law import FORCES, largest_share
 from pma_gym.discovery.grey_box.thresholds import MATERIAL
 from pma_gym.discovery.report.effect_text import effect_names
 from pma_gym.discovery.report.figure_text import (
@@ -73,12 +73,10 @@ def _misses(conclusions: Conclusions) -> str:
 
 def _left(conclusions: Conclusions) -> str:
     """The latent force that is left."""
-    what, unit = (
-        ("torque", "N m") if conclusions.selection.model.plant == "joint" else ("force", "N")
-    )
+    what, unit = FORCES[conclusions.selection.model.plant]
     share = conclusions.share(conclusions.last)
     size = figure(share * conclusions.selection.force)
-    return f"a latent {what} of {size} {unit}, {percent(share)} of the drive's"
+    return f"a latent {what.split()[0]} of {size} {unit}, {percent(share)} of the drive's"
 
 
 def by_trial(conclusions: Conclusions) -> list[str]:

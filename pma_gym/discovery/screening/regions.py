@@ -96,7 +96,7 @@ def single_regions(bins: TimeBins, levels: Sequence[Axis]) -> list[Region]:
     for axis in levels:
         values = getattr(bins, axis.kind)
         # A pressure is known by its unit.
-        name = "" if axis.kind == "pressure" else f"{axis.words} "
+        name = "" if axis.unit == "kPa" else f"{axis.words} "
         for cut in _round_cuts(values[there], (0.2, 0.4, 0.6, 0.8)):
             named.append((axis.kind, f"{name}above {cut:g} {axis.unit}", values > cut))
             named.append((axis.kind, f"{name}under {cut:g} {axis.unit}", values < cut))
