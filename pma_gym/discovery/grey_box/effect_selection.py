@@ -8,10 +8,18 @@ from numpy.typing import NDArray
 
 from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
 from pma_gym.discovery.fitting.free_parameters import free_parameters, prior
-from pma_gym.discovery.grey_box.thresholds import FAINT, LIKE, LOUD, MOST_EFFECTS, ODD, TRIED
+from pma_gym.discovery.grey_box.thresholds import FAINT, LIKE, LINE, LOUD, MOST_EFFECTS, ODD, TRIED
 from pma_gym.effects import CATALOGUE
 from pma_gym.effects.effect import signals
-from pma_gym.estimation.innovations import TREND, TRIAL, GreyBox, Point, Rows, log_likelihood
+from pma_gym.estimation.innovations import (
+    TREND,
+    TRIAL,
+    GreyBox,
+    Point,
+    Rows,
+    log_likelihood,
+    value_in_trial,
+)
 from pma_gym.estimation.likelihood_fit import (
     STEP,
     Coordinate,
@@ -694,6 +702,28 @@ class EffectSelection:
         self.linear = linear
         return replace(now, box=self.box(now.box.model, linear, steps), fit=made)
 
+    def _trend_instead(self, now: Hypothesis) -> Hypothesis:
+        """With a trend in place of several trials that each have a parameter of their own."""
+        of = [slot_.partition(TRIAL)[0] for move in now.moves for slot_ in move.slots]
+        for base in {each for each in of if of.count(each) > 1}:
+            gone = {name for name in now.fit.point.numbers if name.startswith(f"{base}{TRIAL}")}
+            gone |= {slot_ for slot_, name in now.fit.tied.items() if name in gone}
+            numbers = {n: v for n, v in now.fit.point.numbers.items() if n not in gone}
+            less = replace(
+                now.fit,
+                point=replace(now.fit.point, numbers=numbers),
+                coordinates=tuple(c for c in now.fit.coordinates if c.name not in gone),
+                tied={n: of_ for n, of_ in now.fit.tied.items() if n not in gone},
+            )
+            kept = tuple(move for move in now.moves if not gone & set(move.slots))
+            order, trials = now.box.order, range(len(now.box.rows))
+            values = [value_in_trial(now.fit.point, base, i, order) for i in trials]
+            off = values - np.polyval(np.polyfit(order, values, 1), order)
+            if np.abs(off).max() < LINE * np.ptp(values):
+                move = Move(f"{base}{TREND}", 0.0, 1, slots=(f"{base}{TREND}",))
+                now = self._varied(Hypothesis(now.box, less, kept, now.rivals), move, careful=True)
+        return now
+
     def _at_end(self, each: Hypothesis) -> bool:
         """Whether a parameter of one trial has gone as far as it may."""
         for name in each.moves[-1].slots:
@@ -760,7 +790,8 @@ class EffectSelection:
             near = [h.moves[-1].name for h in worth[1:] if h.fit.value - self.price(h, now) > least]
             rivals = tuple(name for name in dict.fromkeys(near) if name != worth[0].moves[-1].name)
             best = self._other_hold(worth[0]) if free else worth[0]
-            path.append(self._refined(replace(best, rivals=(*now.rivals, rivals))))
+            best = self._refined(replace(best, rivals=(*now.rivals, rivals)))
+            path.append(self._trend_instead(best))
         return path
 
 

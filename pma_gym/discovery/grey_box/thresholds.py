@@ -60,3 +60,6 @@ SURE = 3.0
 
 LOUD = 2.0
 """Times the noise that readings show by their third differences that a fitted noise may have."""
+
+LINE = 0.1
+"""Share of their range within which trials' own values lie on a line: then they are a trend."""
