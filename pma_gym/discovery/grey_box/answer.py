@@ -2,8 +2,6 @@
 
 from collections.abc import Callable, Mapping, Sequence
 
-import numpy as np
-
 from pma_gym.data.datasets.dataset import NamedTrial
 from pma_gym.data.trial_columns import BY_QUANTITY
 from pma_gym.discovery.diagnosis import Diagnosis
@@ -14,10 +12,9 @@ from pma_gym.discovery.grey_box.sentence import sentence
 from pma_gym.discovery.grey_box.thresholds import (
     MATERIAL,
 )
-from pma_gym.discovery.result.candidate import ADDED, Candidate
+from pma_gym.discovery.report.figure_text import figure
 from pma_gym.discovery.result.estimates import Approximate
 from pma_gym.discovery.result.noise import Floor
-from pma_gym.estimation.innovations import TREND, TRIAL
 from pma_gym.estimation.logged import Logged
 from pma_gym.plant.model import Model
 from pma_gym.units import SI_FACTORS
@@ -35,21 +32,6 @@ def diagnosis(conclusions: Conclusions) -> Diagnosis:
             for v in (base.fit.point.deviations[i], conclusions.selection.steps_of_readings[i])
         )
         floors[column.name] = Floor(value, "innovations", {"innovations": value}, step, ())
-    chosen = {move.name for move in last.moves}
-    candidates = [
-        Candidate(
-            name,
-            gain,
-            None,
-            float(min(1.0, np.exp(-min(max(gain, 0.0), 600.0)))),
-            0.0,
-            None,
-            True,
-            ADDED if name in chosen else "explains less than its price",
-        )
-        for name, gain in sorted(conclusions.selection.gains.items(), key=lambda pair: -pair[1])
-        if TREND not in name and TRIAL not in name
-    ]
     approximate = conclusions.share(last) > MATERIAL and bool(conclusions.effects)
     return Diagnosis(
         verdict=conclusions.verdict,
@@ -58,7 +40,7 @@ def diagnosis(conclusions: Conclusions) -> Diagnosis:
         effects=conclusions.effects if named else (),
         parameters=conclusions.parameters,
         gap=conclusions.gap,
-        candidates=tuple(candidates),
+        candidates=(),
         next_experiment=None,
         model=conclusions.model,
         given=conclusions.selection.model,
@@ -69,8 +51,25 @@ def diagnosis(conclusions: Conclusions) -> Diagnosis:
         floors=floors,
         states=conclusions.states,
         trials=conclusions.records,
-        steps=(),
+        steps=_steps(conclusions),
+        warnings=(WORSE,) if conclusions.is_worse else (),
     )
+
+
+WORSE = (
+    "predictions of the refitted model miss by more than those of the model as given, so that one "
+    "is what model.toml has"
+)
+"""Said where a refit is not written."""
+
+
+def _steps(conclusions: Conclusions) -> tuple[str, ...]:
+    """What was fitted, the greatest gain first."""
+    gains = sorted(conclusions.selection.gains.items(), key=lambda pair: -pair[1])
+    if not gains:
+        return ("No effect promises enough to be fitted.",)
+    said = ", ".join(f"{name} {figure(gain)}" for name, gain in gains)
+    return (f"Fitted beside the model, with the gain of log likelihood at first: {said}.",)
 
 
 def answered(

@@ -148,6 +148,13 @@ class Conclusions:
         point = with_values(base.fit.point, with_tied({**values, **late}, base.fit.tied))
         return predictions(base.box, point, self.horizon)
 
+    @cached_property
+    def is_worse(self) -> bool:
+        """Whether the model as it came predicts better than the proposed one."""
+        pairs = zip(self.given, self.last.box.rows, strict=True)
+        off = [((c - t.readings[:, :, 0]) / self.selection.noise)[t.there] for c, t in pairs]
+        return _rms(np.concatenate(off)) < self.misfit(self.last)
+
     def share(self, each: Hypothesis) -> float:
         """Latent force, in the mean over the horizon, root mean square over trials.
 
@@ -318,7 +325,7 @@ class Conclusions:
     @cached_property
     def model(self) -> Model:
         """The amended model."""
-        if self.verdict == "agrees":
+        if self.verdict == "agrees" or self.is_worse:
             return self.selection.model
         last = self.path[0] if self.verdict == "unknown" else self.last
         model = last.box.model
@@ -434,7 +441,9 @@ class Conclusions:
     @cached_property
     def law(self) -> ResidualLaw | None:
         """What the latent force goes with."""
-        return latent_law(self.smooth, self.selection.model.rig)
+        base = self.path[0]
+        rows = max(1.0, 2.0 * base.fit.point.memory / self.selection.span)
+        return latent_law(self.smooth, self.selection.model.rig, rows)
 
     @cached_property
     def states(self) -> dict[str, TrialState]:

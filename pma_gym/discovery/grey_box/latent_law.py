@@ -18,12 +18,17 @@ FORCES = {"slide": ("force on the slide", "N"), "joint": ("torque on the joint",
 BINS, LEAST_BINS = 12, 3
 """Of a law that is drawn from the smoothed force, and the fewest that make one."""
 
-INDEPENDENT = 20.0
-"""Rows that count as one independent value of a smoothed force."""
 
+def latent_law(trials: Sequence[Smoothed], rig: Rig, rows: float) -> ResidualLaw | None:
+    """The law, in bins of the position or the speed, whichever explains more of the force.
 
-def latent_law(trials: Sequence[Smoothed], rig: Rig) -> ResidualLaw | None:
-    """The law, in bins of the position or the speed, whichever explains more of the force."""
+    Args:
+        trials: smoothed forces (N, N m).
+        rig: a slide or a joint.
+        rows: that count as one independent value: two memories of the force.
+    Returns:
+        Means with 95 % bands; None where neither position nor speed varies.
+    """
     force = np.concatenate([each.force for each in trials])
     columns = [BY_QUANTITY[signal.name] for signal in rig.signals[:2]]
     values = [[each.position for each in trials], [each.speed for each in trials]]
@@ -39,7 +44,7 @@ def latent_law(trials: Sequence[Smoothed], rig: Rig) -> ResidualLaw | None:
         mean = np.bincount(of, force, bins) / count
         off = (force - mean[of]) ** 2
         explained = 1.0 - float(np.mean(off)) / max(float(np.mean(force**2)), 1e-300)
-        spread = np.sqrt(np.bincount(of, off, bins) / count / np.maximum(count / INDEPENDENT, 1.0))
+        spread = np.sqrt(np.bincount(of, off, bins) / count / np.maximum(count / rows, 1.0))
         at = 0.5 * (edges[:-1] + edges[1:]) / SI_FACTORS[column.unit]
         if best is None or explained > best[0]:
             best = explained, column, at, mean, CONFIDENCE * spread
