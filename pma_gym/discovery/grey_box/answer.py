@@ -6,15 +6,17 @@ from pma_gym.data.datasets.dataset import NamedTrial
 from pma_gym.data.trial_columns import BY_QUANTITY
 from pma_gym.discovery.diagnosis import Diagnosis
 from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
-from pma_gym.discovery.grey_box.conclusions import Conclusions
+from pma_gym.discovery.grey_box.conclusions import Conclusions, path_of
 from pma_gym.discovery.grey_box.effect_selection import EffectSelection
 from pma_gym.discovery.grey_box.sentence import sentence
 from pma_gym.discovery.grey_box.thresholds import (
     MATERIAL,
 )
-from pma_gym.discovery.report.figure_text import figure
+from pma_gym.discovery.report.effect_text import effect_name
+from pma_gym.discovery.report.figure_text import figure, listed
 from pma_gym.discovery.result.estimates import Approximate
 from pma_gym.discovery.result.noise import Floor
+from pma_gym.estimation.innovations import TREND, TRIAL
 from pma_gym.estimation.logged import Logged
 from pma_gym.plant.model import Model
 from pma_gym.units import SI_FACTORS
@@ -63,13 +65,26 @@ WORSE = (
 """Said where a refit is not written."""
 
 
+MOST_SHOWN = 6
+"""Fits that a page lists, those that gained most."""
+
+
 def _steps(conclusions: Conclusions) -> tuple[str, ...]:
     """What was fitted, the greatest gain first."""
+
+    def words(name: str) -> str:
+        base, _, number = name.partition(TRIAL)
+        if number:
+            return f"{path_of(base)} in {conclusions.named[int(number)].name} alone"
+        if name.endswith(TREND):
+            return f"a trend of {path_of(name.removesuffix(TREND))}"
+        return effect_name(name)
+
     gains = sorted(conclusions.selection.gains.items(), key=lambda pair: -pair[1])
-    if not gains:
-        return ("No effect promises enough to be fitted.",)
-    said = ", ".join(f"{name} {figure(gain)}" for name, gain in gains)
-    return (f"Fitted beside the model, with the gain of log likelihood at first: {said}.",)
+    said = [f"{words(name)} {figure(gain)}" for name, gain in gains[:MOST_SHOWN] if gain > 0.0]
+    if not said:
+        return ("Nothing that was fitted beside the model gains any log likelihood.",)
+    return (f"Fitted beside the model, with the gain of log likelihood at first: {listed(said)}.",)
 
 
 def answered(
