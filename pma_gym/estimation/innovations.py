@@ -154,6 +154,9 @@ class Rows:
         linear: whether commands are linear between rows instead of held.
         block: rows of a block.
         stride: of so many blocks one is read.
+        coarse: for each signal, whether its steps are coarser than its noise. A dwell in one step
+            counts as two readings then, the first and the last: those between tell nothing new, and
+            hundreds of them would outweigh all that moves.
     """
 
     def __init__(
@@ -164,6 +167,7 @@ class Rows:
         linear: bool,
         block: int,
         stride: int = 1,
+        coarse: Sequence[bool] = (),
     ) -> None:
         self.steps = steps
         starts = np.arange(0, len(logged.time), block)
@@ -179,6 +183,10 @@ class Rows:
             self.time[::stride],
             np.ascontiguousarray(self.readings[::stride]),
         )
+        self.measured = self.readings[:, :, 1] > 0
+        for i in np.flatnonzero(coarse):
+            dwells = np.diff(self.readings[:, i, 0]) == 0.0
+            self.readings[1:-1, i, 1] *= ~(dwells[1:] & dwells[:-1])
         self.there = self.readings[:, :, 1] > 0
         spans = np.diff(self.time)
         self.lengths = np.concatenate([[0.0], spans / steps])

@@ -8,7 +8,8 @@ import pytest
 from pma_gym import Plant
 from pma_gym.data.trial import Trial
 from pma_gym.effects import CATALOGUE
-from pma_gym.estimation.innovations import counted, log_likelihood, predictions
+from pma_gym.estimation.innovations import Rows, counted, log_likelihood, predictions
+from pma_gym.estimation.logged import Logged
 from pma_gym.plant.model import Model
 from tests.estimation.linear_slide import NOISES, box, kalman, logged, point, slide
 
@@ -158,3 +159,14 @@ def test_predictions_of_a_window_do_not_know_its_readings():
     off = np.abs(after - before)[:, 0]
     assert np.isnan(off[window == 0]).all()
     assert np.nanmax(off[window % 2 == 0]) < 1e-12 and off[window == 3].max() > 1e-4
+
+
+def test_a_dwell_in_a_coarse_step_counts_as_its_first_and_last_reading():
+    steps = np.array([0.0, 1.0, 1.0, 1.0, 1.0, 2.0, 3.0, 3.0, 3.0])
+    time = np.arange(9) / 100
+    log = Trial(time, {"load_command": 0 * time}, {"contraction": 1e-3 * steps})
+    one = Logged.of(slide(), 0, log)
+    coarse, fine = (Rows(one, (0,), 2, False, 1, coarse=[each]) for each in (True, False))
+    read = np.array([1, 1, 0, 0, 1, 1, 1, 0, 1], bool)
+    assert np.array_equal(coarse.there[:, 0], read)
+    assert fine.there.all() and coarse.measured.all()

@@ -19,6 +19,7 @@ from pma_gym.discovery.grey_box.effect_selection import EffectSelection, Hypothe
 from pma_gym.discovery.grey_box.latent_law import latent_law
 from pma_gym.discovery.grey_box.thresholds import (
     CONFIDENCE,
+    FAR,
     HORIZON,
     HORIZON_S,
     LEFT,
@@ -133,7 +134,7 @@ class Conclusions:
     def misfit(self, each: Hypothesis) -> float:
         """Root mean square of what predictions miss, in noises."""
         parts = [
-            ((curve - trial.readings[:, :, 0]) / self.selection.noise)[trial.there]
+            ((curve - trial.readings[:, :, 0]) / self.selection.noise)[trial.measured]
             for curve, trial in zip(self.curves(each), each.box.rows, strict=True)
         ]
         return _rms(np.concatenate(parts))
@@ -152,7 +153,7 @@ class Conclusions:
     def is_worse(self) -> bool:
         """Whether the model as it came predicts better than the proposed one."""
         pairs = zip(self.given, self.last.box.rows, strict=True)
-        off = [((c - t.readings[:, :, 0]) / self.selection.noise)[t.there] for c, t in pairs]
+        off = [((c - t.readings[:, :, 0]) / self.selection.noise)[t.measured] for c, t in pairs]
         return _rms(np.concatenate(off)) < self.misfit(self.last)
 
     def share(self, each: Hypothesis) -> float:
@@ -224,15 +225,32 @@ class Conclusions:
         material = self.share(self.last) > MATERIAL and self.is_latent
         if not self.last.moves and len(self.path) > 1 and self.is_latent:
             return "unknown"
-        if material and (self.left > LEFT or not self.last.moves):
+        missed = self.misfit(self.last) > NOISES and self.is_latent
+        if material and not self.last.moves:
             return "unknown"
+        if self.last.moves and self.left > LEFT and (material or missed):
+            return "unknown"
+        if self.far:
+            return "undecidable"
         if effects:
             return "effect"
-        if not self.last.moves and self.misfit(self.last) > NOISES and self.is_latent:
+        if not self.last.moves and missed:
             return "undecidable"
         if self._within_tolerance() or not self.last.moves and not self._moved:
             return "agrees"
         return "parameters"
+
+    @cached_property
+    def far(self) -> dict[str, float]:
+        """What moves the rig, or its inertia, far from the model's: fitted over given, by slot.
+
+        What was fitted beside such a value stands in for something else, or the value is wrong.
+        """
+        own = self.path[0].box.numbers()
+        names = [".".join(self.selection.model.rig.inertia), *self.selection.gains_of_drive()]
+        free = {c.name for c in self.last.fit.coordinates}
+        ratios = {n: value_of(self.last.fit.point, n) / own[n] for n in names if n in free}
+        return {n: ratio for n, ratio in ratios.items() if not 1.0 / FAR < ratio < FAR}
 
     def _is_sized(self, each: Hypothesis, move: Move) -> bool:
         """Whether some size of an added effect is surely not none."""
@@ -288,7 +306,7 @@ class Conclusions:
             measured, before, refitted, after = (np.full(shape, np.nan) for _ in range(4))
             own = {}
             for i, channel in enumerate(last.box.channels):
-                there = trial.there[:, i]
+                there = trial.measured[:, i]
                 measured[there, channel] = trial.readings[there, i, 0]
                 for room, curve in zip((before, refitted, after), models, strict=True):
                     room[:, channel] = curve[:, i]
@@ -325,7 +343,7 @@ class Conclusions:
     @cached_property
     def model(self) -> Model:
         """The amended model."""
-        if self.verdict == "agrees" or self.is_worse:
+        if self.verdict == "agrees" or self.is_worse or self.far:
             return self.selection.model
         last = self.path[0] if self.verdict == "unknown" else self.last
         model = last.box.model

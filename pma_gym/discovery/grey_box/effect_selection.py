@@ -8,7 +8,16 @@ from numpy.typing import NDArray
 
 from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
 from pma_gym.discovery.fitting.free_parameters import free_parameters, prior
-from pma_gym.discovery.grey_box.thresholds import FAINT, LIKE, LINE, LOUD, MOST_EFFECTS, ODD, TRIED
+from pma_gym.discovery.grey_box.thresholds import (
+    FAINT,
+    LIKE,
+    LINE,
+    LOUD,
+    MATERIAL,
+    MOST_EFFECTS,
+    ODD,
+    TRIED,
+)
 from pma_gym.effects import CATALOGUE
 from pma_gym.effects.effect import signals
 from pma_gym.estimation.innovations import (
@@ -62,6 +71,9 @@ BENT = 0.2
 
 STARTS, SMOOTH_STARTS = 8, 3
 """Of the first fit, with and without dry friction, whose likelihood is rugged."""
+
+BEAM, BESIDE = 3, 3
+"""Hypotheses that a stage hands on, and moves that each but the likeliest is extended by."""
 
 MOST_TRIALS = 6
 """With so many trials at most, each is once taken for an odd one.
@@ -189,6 +201,9 @@ class EffectSelection:
             max(white_noise(rows), s / 12**0.5)
             for rows, s in zip(readings, self.steps_of_readings, strict=True)
         ]
+        self.coarse = [
+            white_noise(rows) < s for rows, s in zip(readings, self.steps_of_readings, strict=True)
+        ]
         self.block = self._block(readings)
         total = sum(len(each.time) for each in logged) / self.block
         self.stride = max(1, int(total / MOST_ROWS))
@@ -229,7 +244,7 @@ class EffectSelection:
         linear = bool(self.linear if linear is None else linear)
         if (steps, linear) not in self._rows:
             each = [
-                Rows(one, self.channels, steps, linear, self.block, self.stride)
+                Rows(one, self.channels, steps, linear, self.block, self.stride, self.coarse)
                 for one in self.logged
             ]
             self._rows[steps, linear] = each
@@ -249,7 +264,7 @@ class EffectSelection:
             forces.append(drive.law(*(at[name] for name in signals(drive.law))))
         return abs(forces[0] - forces[1]) or 1.0
 
-    def _gains(self) -> list[str]:
+    def gains_of_drive(self) -> list[str]:
         """Slots of the drive's gain, which one trial cannot tell from the inertia.
 
         But several can from each other.
@@ -393,7 +408,7 @@ class EffectSelection:
         own = {c.name for c in fitted.coordinates}
         drive = [
             Coordinate(name, abs(fitted.point.numbers[name]))
-            for name in self._gains()
+            for name in self.gains_of_drive()
             if name not in own
         ]
         mean = [
@@ -609,11 +624,11 @@ class EffectSelection:
             return [move for move in moves[:TRIED] if move.promise > price]
         return [*moves[:TRIED], *self._odd(now, moves[TRIED:])]
 
-    def _is_bent(self, now: Hypothesis) -> bool:
+    def _is_bent(self, now: Hypothesis, share: float = FAINT) -> bool:
         """Whether a latent force, or more noise than the readings show, stands in for something."""
         point = now.fit.point
         noisy = [d > LOUD * n for d, n in zip(point.deviations, self.noise, strict=True)]
-        return max(point.forces) > FAINT * self.force or any(noisy)
+        return max(point.forces) > share * self.force or any(noisy)
 
     def _odd(self, now: Hypothesis, moves: Sequence[Move]) -> list[Move]:
         """Each parameter of the trial whose latent force stands out."""
@@ -733,8 +748,13 @@ class EffectSelection:
         return False
 
     def _again(self, now: Hypothesis, larger: Hypothesis) -> Hypothesis:
-        """A hypothesis fitted again from where a larger one ended."""
-        values = {c.name: value_of(larger.fit.point, c.name) for c in now.fit.coordinates}
+        """A hypothesis fitted again from where another one ended."""
+        shared = {c.name for c in larger.fit.coordinates}
+        values = {
+            c.name: value_of(larger.fit.point, c.name)
+            for c in now.fit.coordinates
+            if c.name in shared
+        }
         box, tied = self.box(now.box.model, steps=larger.box.rows[0].steps), now.fit.tied
         made = [
             fit(box, with_values(now.fit.point, with_tied(values, tied)), now.fit.coordinates, tied)
@@ -761,38 +781,73 @@ class EffectSelection:
         return 0.5 * numbers * float(np.log(self._readings(each)))
 
     def run(self) -> list[Hypothesis]:
-        """From the model as it came to the last hypothesis that is worth its price."""
+        """From the model as it came to the last hypothesis that is worth its price.
+
+        A beam: the likeliest hypotheses of a stage are all extended in the next, for an effect that
+        is likeliest alone may have no part in the likeliest pair.
+        """
         free = self.linear is None
-        path = [self.base()]
-        self.unmoved = self._unmoved(path[0])
+        base = self.base()
+        self.unmoved = self._unmoved(base)
+        best, beam = [base], [[base]]
         for stage in range(MOST_EFFECTS):
-            now = path[-1]
+            tried = self._extended(beam, f"effect {stage + 1}")
+            if not tried or self._lead(tried[0], best) < 0.0:
+                break
+            for at, chain in enumerate(tried[:2]):
+                *before, last = chain
+                again = self.tried(before[-1], last.moves[-1], careful=True)
+                if again.fit.value > last.fit.value:
+                    tried[at] = [*before, again]
+            tried.sort(key=self._worth, reverse=True)
+            # Others begin where the likeliest one ended: no start is ahead.
+            for at, (*before, last) in enumerate(tried[1:BEAM], 1):
+                tried[at] = [*before, self._again(last, tried[0][-1])]
+            tried.sort(key=self._worth, reverse=True)
+            *before, now, last = tried[0]
+            chain = [*before, self._again(now, last), last]
+            if len(chain) == 2:
+                best = chain[:1]
+            if self._lead(chain, best) < LIKE:
+                break
+            least = self._worth(chain) - LIKE
+            near = [
+                other[-1].moves[-1].name
+                for other in tried[1:]
+                if other[:-1] == tried[0][:-1] and self._worth(other) > least
+            ]
+            rivals = tuple(dict.fromkeys(name for name in near if name != last.moves[-1].name))
+            last = replace(last, rivals=(*now.rivals, rivals))
+            last = self._refined(self._other_hold(last) if free else last)
+            best = [*chain[:-1], self._trend_instead(last)]
+            beam = [best]
+            if self._is_bent(best[-1], MATERIAL):
+                beam += [c for c in tried[1:BEAM] if self._lead(c, c[:-1]) > 0.0]
+        return best
+
+    def _worth(self, chain: Sequence[Hypothesis]) -> float:
+        """Log likelihood of a chain's last hypothesis, less its price."""
+        return chain[-1].fit.value - self.price(chain[-1], chain[0])
+
+    def _lead(self, chain: Sequence[Hypothesis], other: Sequence[Hypothesis]) -> float:
+        return self._worth(chain) - self._worth(other)
+
+    def _extended(self, beam: Sequence[list[Hypothesis]], step: str) -> list[list[Hypothesis]]:
+        """Every chain with each of its most promising moves, the likeliest for its price first."""
+        seen, tried = set[frozenset[str]](), list[list[Hypothesis]]()
+        for rank, chain in enumerate(beam):
+            now = chain[-1]
             moves = self._worth_a_fit(now)
-            tried = []
-            for number, move in enumerate(moves):
-                self.tell(f"effect {stage + 1}", number, len(moves))
-                tried.append(self.tried(now, move))
-                self.gains.setdefault(move.name, tried[-1].fit.value - now.fit.value)
-            tried = [h for h in tried if not self._at_end(h)]
-            worth = sorted(tried, key=lambda h: self.price(h, now) - h.fit.value)
-            if worth and worth[0].fit.value < now.fit.value + self.price(worth[0], now):
-                break
-            for at, each in enumerate(worth[:2]):
-                again = self.tried(now, each.moves[-1], careful=True)
-                worth[at] = again if again.fit.value > each.fit.value else each
-            worth.sort(key=lambda h: self.price(h, now) - h.fit.value)
-            if worth:
-                # The smaller hypothesis begins where the larger one ended: no start is ahead.
-                now = path[-1] = self._again(now, worth[0])
-            if not worth or worth[0].fit.value < now.fit.value + self.price(worth[0], now) + LIKE:
-                break
-            least = worth[0].fit.value - self.price(worth[0], now) - LIKE
-            near = [h.moves[-1].name for h in worth[1:] if h.fit.value - self.price(h, now) > least]
-            rivals = tuple(name for name in dict.fromkeys(near) if name != worth[0].moves[-1].name)
-            best = self._other_hold(worth[0]) if free else worth[0]
-            best = self._refined(replace(best, rivals=(*now.rivals, rivals)))
-            path.append(self._trend_instead(best))
-        return path
+            for number, move in enumerate(moves if not rank else moves[:BESIDE]):
+                names = frozenset(each.name for each in (*now.moves, move))
+                if names in seen:
+                    continue
+                self.tell(step, number, len(moves))
+                larger = self.tried(now, move)
+                seen |= {names} if move.start is None else set()
+                self.gains.setdefault(move.name, larger.fit.value - now.fit.value)
+                tried += [[*chain, larger]] if not self._at_end(larger) else []
+        return sorted(tried, key=self._worth, reverse=True)
 
 
 def is_rough(model: Model) -> bool:

@@ -43,6 +43,8 @@ def sentence(conclusions: Conclusions) -> str:
             f"Something that no effect of the catalogue carries acts on the {rig}: {left}."
             f"{words}{best}"
         )
+    if conclusions.verdict == "undecidable" and conclusions.far:
+        return _far(conclusions)
     if conclusions.verdict == "undecidable":
         return f"Too little is left to name: {left}, but {_misses(conclusions)}. {WHAT_TO_CHECK}"
     if own:
@@ -57,6 +59,22 @@ def sentence(conclusions: Conclusions) -> str:
         return f"No effect is missing; {said}; {_misses(conclusions)}; {left}, is left."
     trials = "these trials" if len(conclusions.named) > 1 else "this trial"
     return f"The model agrees with {trials}: {_misses(conclusions)}; {left}, is left."
+
+
+def _far(conclusions: Conclusions) -> str:
+    """What the fit does to a parameter that the model should have nearly right."""
+    moved = []
+    for name in conclusions.far:
+        now = conclusions.parameters[path_of(name)]
+        moved.append(f"{path_of(name)} {estimate_text(now.now)} instead of {figure(now.start)}")
+    names = effect_names([each.name for each in conclusions.effects])
+    beside = f", beside {names}" if names else ""
+    return (
+        f"These trials do not decide: they are best explained by {listed(moved)}{beside}, too far "
+        "from the model to believe. If that value is a guess, write the fitted one into the model "
+        "and diagnose again; else check the units and the sign of the command, and log a trial "
+        "with faster reversals."
+    )
 
 
 def _misses(conclusions: Conclusions) -> str:

@@ -63,3 +63,9 @@ LOUD = 2.0
 
 LINE = 0.1
 """Share of their range within which trials' own values lie on a line: then they are a trend."""
+
+FAR = 3.0
+"""Factor by which an inertia, or a drive's gain, may differ from the model's.
+
+Assumption: a data sheet or a scale is off by less, so that beyond it the fit bends the value.
+"""

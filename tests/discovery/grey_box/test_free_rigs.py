@@ -1,12 +1,16 @@
 """Diagnoses of slides and joints of another simulator: what is wrong with them is known."""
 
 import re
+import subprocess
+import sys
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from pma_gym import Plant
+from pma_gym.data.datasets.dataset import read_dataset
 from pma_gym.data.trial import Trial
 from pma_gym.discovery import diagnose
 from pma_gym.effects import CATALOGUE
@@ -188,3 +192,40 @@ def test_an_axis_that_turns_1300_times_lacks_friction_or_a_constant_torque():
     size = effect.parameters.get("dynamic_n_m") or effect.parameters["torque_n_m"]
     assert abs(size.value) == pytest.approx(0.022, rel=0.02)
     assert inertia_of(diagnosis, "joint") == pytest.approx(1.2e-4 / 0.01, rel=0.02)
+
+
+EXAMPLES = Path(__file__).parents[3] / "docs" / "examples"
+
+
+@cache
+def measured(name, folder):
+    """The diagnosis of an example of a measured rig, from its logs as they came."""
+    script = EXAMPLES / f"{name}.py"
+    subprocess.run([sys.executable, script, folder], check=True, stdout=subprocess.DEVNULL)
+    return diagnose(read_dataset(folder), propose=False)
+
+
+@pytest.mark.campaign
+def test_a_geared_servo_that_swings_a_weight_lacks_it_and_friction_by_load(tmp_path):
+    """0.48 N m at 90 deg; within the swing a spring and a weight are much alike."""
+    diagnosis = measured("servo_pendulum", tmp_path)
+    named = {name: each for each in diagnosis.effects for name in (each.name, *each.confused_with)}
+    assert diagnosis.verdict == "effect", diagnosis.sentence
+    assert {"joint_weight", "joint_load_friction"} <= set(named)
+    (angle,) = diagnosis.gap.values()
+    assert angle.after < 0.1 * angle.before
+
+
+@pytest.mark.campaign
+def test_a_servo_whose_voltage_is_rebuilt_from_a_guess_decides_nothing(tmp_path):
+    diagnosis = measured("servo_wheel", tmp_path)
+    assert diagnosis.verdict == "undecidable" and not diagnosis.effects
+    assert "too far from the model" in diagnosis.sentence
+    assert diagnosis.model == diagnosis.given
+
+
+def test_an_inertia_far_from_the_data_sheet_is_said_and_what_to_write_helps():
+    trials = logs("joint", 2.0)
+    diagnosis = diagnose(trials, model("joint", inertia=5.0, presliding=NEAR["joint"]))
+    assert diagnosis.verdict == "undecidable", diagnosis.sentence
+    assert "inertia.inertia_kg_m2" in diagnosis.sentence and diagnosis.model == diagnosis.given
