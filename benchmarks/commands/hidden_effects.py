@@ -26,8 +26,7 @@ def hidden_effects(
     block: Annotated[
         str,
         typer.Option(
-            help="single, faint, nothing, parameters, pair, unknown, slow_drift, undecidable, "
-            "rigs, or all."
+            help="single, faint, nothing, parameters, pair, unknown, slow_drift, rigs, or all."
         ),
     ],
     n: Annotated[int, typer.Option("--n", min=1, help="Cases of a block; more extend the set.")],
@@ -41,9 +40,6 @@ def hidden_effects(
     json_file: Annotated[
         Path | None, typer.Option("--json", help="File for all figures, in a folder that exists.")
     ] = None,
-    rounds: Annotated[
-        int, typer.Option(min=0, max=3, help="Experiments that follow, in block undecidable.")
-    ] = 2,
     keep: Annotated[bool, typer.Option("--keep", help="Keep the trials in FOLDER/data.")] = False,
     recompute: Recompute = False,
 ) -> None:
@@ -52,7 +48,7 @@ def hidden_effects(
 
     require_writable(json_file, "--json")
     places = executor_named(executor, jobs)
-    blocks, orders = ordered(block, rounds), []
+    blocks, orders = ordered(block), []
     for each in blocks:
         usual = (out or RESULTS / "hidden_effects") / f"{each.name}-{seed}"
         folder = usual if out is None or len(blocks) > 1 else out

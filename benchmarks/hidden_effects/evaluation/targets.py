@@ -124,15 +124,6 @@ _UNKNOWN = (
     Rate("detected", lambda o: o.detected),
 )
 
-_UNDECIDABLE = (
-    Rate("undecidable", lambda o: o.verdict == "undecidable", Target(least=0.95)),
-    Rate("a false name", lambda o: o.wrong),
-    Rate("proposed, settled in 2 rounds", lambda o: o.settled_by("proposed", 2), Target(least=0.8)),
-    Rate("proposed, settled in 1 round", lambda o: o.settled_by("proposed", 1)),
-    Rate("random, settled in 2 rounds", lambda o: o.settled_by("random", 2)),
-    Rate("random, settled in 1 round", lambda o: o.settled_by("random", 1)),
-)
-
 
 def _of(kind: str, hit: Callable[[Outcome], bool | None]) -> Callable[[Outcome], bool | None]:
     """The same of the cases of one kind alone."""
@@ -174,7 +165,6 @@ RATES: dict[str, tuple[Rate, ...]] = {
     **{f"single_{ugly}": _SINGLE_UGLY for ugly in UGLY},
     **{f"nothing_{ugly}": _NOTHING_UGLY for ugly in UGLY},
     "slow_drift": _SLOW_DRIFT,
-    "undecidable": _UNDECIDABLE,
     "rigs": _RIGS,
 }
 """By block."""
@@ -196,14 +186,3 @@ def percent(figure: dict[str, Any]) -> str:
     low, high = 100 * figure["low"], 100 * figure["high"]
     share = 100 * figure["rate"]
     return f"{share:.1f} % ({low:.1f}-{high:.1f}), {figure['hits']} of {figure['n']}"
-
-
-def listed(counts: dict[str, int]) -> str:
-    """Counts by name: `creep 14, unknown 1`."""
-    return ", ".join(f"{name} {n}" for name, n in counts.items())
-
-
-def instead(off: dict[str, Any]) -> str:
-    """What was named where a parameter that was off was not: `cable.stiffness 2, nothing 1`."""
-    nothing = {"nothing": off["nothing_instead"]} if off["nothing_instead"] else {}
-    return listed(off["instead"] | nothing) or "-"

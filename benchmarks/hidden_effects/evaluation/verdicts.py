@@ -2,13 +2,12 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, get_args
+from typing import Any
 
 from benchmarks.hidden_effects.generation.effect_size import UNTOLD
 from benchmarks.hidden_effects.generation.effects import ALL
 from benchmarks.hidden_effects.generation.groups import expected, group
 from benchmarks.hidden_effects.rigs import effect_size
-from pma_gym.discovery.diagnosis import Verdict
 
 STRUCTURAL = ("effect", "unknown")
 """Verdicts that claim more than parameters."""
@@ -21,9 +20,6 @@ MOST_LEFT = 3.0
 
 NO_ANSWER = "no answer"
 """Verdict where the diagnosis raised an error."""
-
-VERDICTS = (*get_args(Verdict), NO_ANSWER)
-"""What is said where nothing is named."""
 
 PATHS: dict[str, tuple[str, ...]] = {
     "force_slope": ("contractile_force.slope",),
@@ -82,11 +78,9 @@ class Outcome:
         off: base parameters that were off by a tenth, where nothing else is hidden.
         moved: paths of base parameters that are named as off, in such a block.
         sentence: the answer as a person would say it, or what was raised instead.
-        kind: of data that excite too little, or of what a rig of another lab hides; empty
-            elsewhere.
+        kind: of what a rig of another lab hides; empty elsewhere.
         left: the largest misfit of a signal after the amended model, over its noise; None where
             the truth has no noise.
-        rounds: results of the experiments that followed, by who chose them.
     """
 
     block: str
@@ -116,7 +110,6 @@ class Outcome:
     moved: tuple[str, ...] = ()
     kind: str = ""
     left: float | None = None
-    rounds: Mapping[str, Sequence[Mapping[str, Any]]] = field(default_factory=dict)
     sentence: str = ""
 
     @property
@@ -151,16 +144,6 @@ class Outcome:
     def missing(self) -> tuple[str, ...]:
         """Base parameters that were off and are not named."""
         return tuple(name for name in self.off if not _all_start_with(self.moved, PATHS[name]))
-
-    def settled_by(self, chooser: str, most: int) -> bool:
-        """Whether the truth or its group was named within so many rounds of a way, or at once."""
-        if self.verdict == "effect" and self.near:
-            return True
-        return any(each["settled"] for each in self.rounds.get(chooser, ())[:most])
-
-    def rounds_of(self, chooser: str, most: int) -> int:
-        """In which round the truth or its group was named; one more than most if in none."""
-        return next((k for k in range(most + 1) if self.settled_by(chooser, k)), most + 1)
 
 
 def compare(truth: Mapping[str, Any], answer: Mapping[str, Any]) -> Outcome:
@@ -214,21 +197,6 @@ def compare(truth: Mapping[str, Any], answer: Mapping[str, Any]) -> Outcome:
 def no_answer(message: str) -> dict[str, Any]:
     """What stands for the answer of a diagnosis that raised an error: no hit, and no claim."""
     return {"verdict": NO_ANSWER, "effects": [], "parameters": {}, "gap": {}, "sentence": message}
-
-
-def of_group(named: Sequence[str], hidden: Sequence[str]) -> bool:
-    """Whether one of some names is of the group of one that is hidden."""
-    return any(name in group(truth) for truth in hidden for name in named)
-
-
-def judged(said: str, hidden: Sequence[str]) -> dict[str, bool]:
-    """Whether what was said, as `Outcome.said` has it, settles what is hidden, or is wrong.
-
-    It settles where it names the truth or its group and nothing else; it is wrong where it names
-    something and does not settle.
-    """
-    settled = all(of_group([name], hidden) for name in said.split(" + "))
-    return {"settled": settled, "wrong": not settled and said not in VERDICTS}
 
 
 def _off(truth: Mapping[str, Any]) -> list[str]:

@@ -9,8 +9,8 @@ import pytest
 
 from benchmarks.hidden_effects.evaluation.scoring import count
 from benchmarks.hidden_effects.evaluation.verdicts import compare
+from benchmarks.hidden_effects.generation.cases import BLOCKS
 from benchmarks.hidden_effects.generation.files import write_case
-from benchmarks.hidden_effects.generation.undecidable import BLOCKS
 from benchmarks.hidden_effects.rigs import drawing, effect_size, files
 from benchmarks.hidden_effects.rigs.drawing import KNOWN, OFFERS, catalogue_name, group
 from benchmarks.hidden_effects.rigs.driven_campaign import draw_driven
