@@ -6,7 +6,6 @@ from statistics import fmean
 from benchmarks.reproduction.plots import replay_figure
 from benchmarks.reproduction.replay import ReplayError, all_replay_errors, summarise, table_angle
 from benchmarks.reproduction.results import Results
-from benchmarks.reproduction.rotation_reading import reading_blocks
 from benchmarks.reproduction.tables import MISSING, RULE, replay_table
 from benchmarks.runner.phase_score import UNITS, PhaseScore, measured_score
 from pma_gym.pages.document import Block, Heading, Paragraph, Picture, TextTable
@@ -89,7 +88,6 @@ def replay_blocks(results: Results) -> list[Block]:
     phase_errors = errors.get(("rotation", "II"))
     if phase_errors:
         blocks += _hold_blocks(results, phase_errors)
-        blocks += reading_blocks(model)
     return blocks
 
 
