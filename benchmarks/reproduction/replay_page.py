@@ -8,7 +8,7 @@ from benchmarks.reproduction.replay import ReplayError, all_replay_errors, summa
 from benchmarks.reproduction.results import Results
 from benchmarks.reproduction.tables import MISSING, RULE, replay_table
 from benchmarks.runner.phase_score import UNITS, PhaseScore, measured_score
-from pma_gym.pages.document import Block, Heading, Paragraph, Picture, TextTable
+from pma_gym.pages.document import Block, Heading, Paragraph, TextTable
 from pma_gym.plant.model import shipped_models
 
 PARTS = ("rmse", "line_error", "scatter")
@@ -75,7 +75,6 @@ def replay_blocks(results: Results) -> list[Block]:
             f"The dissertation's printed voltages drive `{model}`; what comes out is compared "
             f"with what the real station did. Errors are simulated less measured. {_origin(model)}"
         ),
-        Picture("replay_errors", "Errors of the replay, trial by trial.", printed=True),
         replay_figure(results),
     ]
     displacement = errors.get(("displacement", "displacement"))
