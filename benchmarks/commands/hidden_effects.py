@@ -11,7 +11,6 @@ from benchmarks.commands.options import (
     Jobs,
     Recompute,
     app,
-    require_writable,
     writable_out,
 )
 from benchmarks.executors.choice import executor_named
@@ -37,23 +36,19 @@ def hidden_effects(
         Path | None,
         typer.Option(help="Folder; results/hidden_effects/BLOCK-SEED if not given."),
     ] = None,
-    json_file: Annotated[
-        Path | None, typer.Option("--json", help="File for all figures, in a folder that exists.")
-    ] = None,
     keep: Annotated[bool, typer.Option("--keep", help="Keep the trials in FOLDER/data.")] = False,
     recompute: Recompute = False,
 ) -> None:
     """Hide effects in trials, diagnose them, count what was named right; goes on after Ctrl-C."""
     from benchmarks.hidden_effects.run_blocks import Order, ordered, run_hidden_effects
 
-    require_writable(json_file, "--json")
     places = executor_named(executor, jobs)
     blocks, orders = ordered(block), []
     for each in blocks:
         usual = (out or RESULTS / "hidden_effects") / f"{each.name}-{seed}"
         folder = usual if out is None or len(blocks) > 1 else out
         orders.append(Order(each, n, seed, folder, places, keep, recompute))
-    raise typer.Exit(run_hidden_effects(orders, json_file))
+    raise typer.Exit(run_hidden_effects(orders))
 
 
 @app.command(
@@ -62,7 +57,8 @@ def hidden_effects(
 )
 def hidden_effects_report(
     places: Annotated[
-        list[Path], typer.Argument(help="Folders or --json files of `hidden-effects`.")
+        list[Path],
+        typer.Argument(help="Folders of `hidden-effects`, or .json files of this command."),
     ],
     out: Annotated[
         Path | None,

@@ -177,7 +177,7 @@ def read_scores(places: Sequence[Path]) -> dict[str, Any]:
         if not path.is_file():
             raise JobError(
                 f"{path}: there is no such file; name a folder in which `python -m benchmarks "
-                "hidden-effects` ended, or its --json file"
+                "hidden-effects` ended, or a .json file of hidden-effects-report"
             )
         try:
             document = read_json(path, "journal_mib", own=True)
@@ -200,7 +200,7 @@ def read_scores(places: Sequence[Path]) -> dict[str, Any]:
     return merged(documents)
 
 
-def run_hidden_effects(orders: Sequence[Order], json_file: Path | None) -> int:
+def run_hidden_effects(orders: Sequence[Order]) -> int:
     """Run blocks one after the other and print their figures.
 
     Returns:
@@ -208,17 +208,14 @@ def run_hidden_effects(orders: Sequence[Order], json_file: Path | None) -> int:
     Raises:
         JobError: a folder holds another set.
     """
-    documents = []
+    code = 0
     for order in orders:
         document = run_block(order)
         if document is None:
             return INTERRUPTED
-        documents.append(document)
         print(report(document), flush=True)
-    whole = merged(documents)
-    if json_file is not None:
-        write_text(json_file, json_text(whole))
-    return FAILED if whole["failures"] else 0
+        code = FAILED if document["failures"] else code
+    return code
 
 
 def json_text(document: dict[str, Any]) -> str:

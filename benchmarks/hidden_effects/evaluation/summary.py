@@ -11,7 +11,7 @@ from pma_gym.documents import read_json
 from pma_gym.pages.document import Block, Heading, Paragraph, TextTable, to_html, to_markdown
 
 KEPT = Path(__file__).resolve().parents[3] / "docs" / "figures" / "hidden-effects.json"
-"""What runs of `hidden-effects --json` wrote of their blocks, put together."""
+"""What `hidden-effects-report --out FILE.json` wrote of the blocks."""
 
 ROWS = (
     ("one effect, 0.5 to 2 noises: named", "single", "named right"),
@@ -109,20 +109,10 @@ def _own(figures: dict[str, Any]) -> list[Block]:
         text += f" A diagnosis took {seconds['median']:.1f} s (median), {seconds['most']:.1f} s"
         text += " at most."
     tables: list[tuple[Any, Any]] = [
-        (figures["by_size"] if len(figures["by_size"]) > 1 else [], _by_size),
         (figures["sizes"]["by_parameter"], _sizes),
         (figures["misses"], _misses),
     ]
     return [Paragraph(text), *(table(some) for some, table in tables if some)]
-
-
-def _by_size(ranges: list[dict[str, Any]]) -> TextTable:
-    kinds = ["named", "named or its group", "detected"]
-    rows = [
-        [f"{each['low']:g} to {each['high']:g}", *(percent(each[kind]) for kind in kinds)]
-        for each in ranges
-    ]
-    return TextTable("By size r of what is hidden", ["r", *kinds], rows)
 
 
 def _sizes(parameters: dict[str, Any]) -> TextTable:

@@ -47,11 +47,6 @@ class Rate:
     target: Target | None = None
 
 
-def _within(hit: Callable[[Outcome], bool | None]) -> Callable[[Outcome], bool | None]:
-    """The same of those cases alone whose effect is as large as the block promises."""
-    return lambda outcome: hit(outcome) if outcome.strong else None
-
-
 _SINGLE = (
     Rate("named right", lambda o: o.right, Target(least=0.92)),
     Rate("right or in its group", lambda o: o.near, Target(least=0.98)),
@@ -59,8 +54,6 @@ _SINGLE = (
     Rate("confidently wrong", lambda o: o.wrong, Target(most=0.02)),
     Rate("detected", lambda o: o.detected),
     Rate("a spurious second", lambda o: o.spurious),
-    Rate("named right, r as promised", _within(lambda o: o.right)),
-    Rate("right or in its group, r as promised", _within(lambda o: o.near)),
 )
 
 _FAINT = (
@@ -69,7 +62,6 @@ _FAINT = (
     Rate("named right", lambda o: o.right),
     Rate("right or in its group", lambda o: o.near),
     Rate("... or said to be what may be meant", lambda o: o.beside),
-    Rate("detected, r as promised", _within(lambda o: o.detected)),
 )
 
 _NOTHING = (

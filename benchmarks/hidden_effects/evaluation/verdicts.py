@@ -39,12 +39,6 @@ PATHS: dict[str, tuple[str, ...]] = {
 VISIBLE = 0.2
 """A signal's gap counts where it is larger than the floor by this share."""
 
-LEAST_RATIO = {"faint": 0.3}
-"""r that a block promises of its effects, at least; 0.5 in the others."""
-
-NEAR_RATIO = 0.95
-"""Share of it that is near enough."""
-
 
 @dataclass
 class Outcome:
@@ -73,7 +67,6 @@ class Outcome:
         seconds: how long the diagnosis took.
         number: of the case in its set.
         ratio: the smallest r of what is hidden, None where nothing is.
-        strong: whether each hidden effect is as large as its block promises.
         answered: whether there was an answer; without one it hits nothing and claims nothing.
         off: base parameters that were off by a tenth, where nothing else is hidden.
         moved: paths of base parameters that are named as off, in such a block.
@@ -104,7 +97,6 @@ class Outcome:
     seconds: float | None = None
     number: int = 0
     ratio: float | None = None
-    strong: bool = True
     answered: bool = True
     off: tuple[str, ...] = ()
     moved: tuple[str, ...] = ()
@@ -162,7 +154,6 @@ def compare(truth: Mapping[str, Any], answer: Mapping[str, Any]) -> Outcome:
     beside = any(meant & {effect["name"], *effect["confused_with"][:2]} for effect in effects[:1])
     right = bool(hidden) and sorted(named) == sorted(hidden)
     block, ratios = truth["block"], [e["r"] for e in truth["effects"] if "r" in e]
-    least = NEAR_RATIO * LEAST_RATIO.get(block, 0.5)
     odds = list((truth.get("log_odds") or {}).values())
     outcome = Outcome(
         block=block,
@@ -172,7 +163,6 @@ def compare(truth: Mapping[str, Any], answer: Mapping[str, Any]) -> Outcome:
         parameters_tellable=min(odds) > UNTOLD if odds else None,
         off=tuple(_off(truth)) if block == "parameters" else (),
         kind=truth.get("kind", ""),
-        strong=all(ratio >= least for ratio in ratios),
         verdict=verdict,
         named=named,
         right=right,
