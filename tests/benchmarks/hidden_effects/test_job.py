@@ -7,7 +7,6 @@ import pytest
 from typer.testing import CliRunner
 
 from benchmarks.__main__ import app
-from benchmarks.executors.choice import local
 from benchmarks.hidden_effects import run_blocks
 from benchmarks.hidden_effects.evaluation import scoring
 from benchmarks.hidden_effects.evaluation.records import measured_text, method_digest
@@ -67,12 +66,6 @@ def test_an_interrupted_run_keeps_its_cases_and_goes_on_to_the_same_figures(
     assert [path.stat().st_mtime_ns for path in kept] == before
     assert again is not None and timeless(again) == timeless(whole[1])
     assert timeless(json.loads((tmp_path / "score.json").read_text("utf-8"))) == timeless(again)
-
-
-@pytest.mark.campaign
-def test_two_processes_find_what_one_finds(whole, tmp_path):
-    records = run_block(order(tmp_path, executor=local(2)))
-    assert records is not None and timeless(records) == timeless(whole[1])
 
 
 def test_a_larger_set_has_the_same_first_cases(whole, tmp_path):
