@@ -57,10 +57,10 @@ def run_measured(
     Returns:
         Rms errors (file units) by model and figure.
     """
-    console, given = console or SafeConsole(), load_model(GIVEN)
+    console, initial_model = console or SafeConsole(), load_model(GIVEN)
     # Fits of other code go unused.
     code = code_digest()
-    said, effects, amended = list[str](), list[str](), given
+    said, effects, amended = list[str](), list[str](), initial_model
     for number in range(1, MOST_ROUNDS + 1):
         with console.status(f"round {number}"):
             diagnosis = diagnose(
@@ -77,8 +77,8 @@ def run_measured(
             break
         effects, amended = effects + added, diagnosis.model
     with console.status("fitted to six pressures, judged on the other five"):
-        rig = Rig.of(diagnosed(DIAGNOSED_KPA), given, jobs)
-        models = {"as given": given, "parameters refitted": rig.fit((), amended)}
+        rig = Rig.of(diagnosed(DIAGNOSED_KPA), initial_model, jobs)
+        models = {"as given": initial_model, "parameters refitted": rig.fit((), amended)}
         models[f"with {', '.join(effects)}" if effects else "amended"] = rig.fit(effects, amended)
         errors = {name: unseen_errors(model) for name, model in models.items()}
     errors["scatter of the repeats"] = repeat_scatter(measured_dataset(steps=0))
