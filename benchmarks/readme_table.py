@@ -97,34 +97,6 @@ def parts(run: Run) -> str:
     return _table(header, rows, words=1)
 
 
-def reading(run: Run) -> str:
-    """Table 30 as measured, as replayed, and as the replay may have been read: means by phase."""
-    rows = []
-    for phase in PHASES["rotation"]:
-        entries = [entry for entry in run["rotation_reading"] if entry["phase"] == phase]
-        means = [fmean(entry[who] for entry in entries) for who in ("measured", "plain", "read")]
-        errors = [
-            fmean(abs(entry[who] - entry["measured"]) for entry in entries)
-            for who in ("plain", "read")
-        ]
-        rows.append([f"phase {phase}", *(f"{value:.2f}" for value in (*means, *errors))])
-    every = run["rotation_reading"]
-    whole = [fmean(abs(e[who] - e["measured"]) for e in every) for who in ("plain", "read")]
-    rows.append(["all", "", "", "", *(f"{value:.2f}" for value in whole)])
-    return _table(
-        [
-            "Table 30, RMSE (deg)",
-            "measured",
-            "replay",
-            "replay as it may have been read",
-            "mean absolute error: replay",
-            "as read",
-        ],
-        rows,
-        words=1,
-    )
-
-
 FIGURES: dict[str, Callable[[Run], str]] = {
     function.__name__: function
     for function in (
@@ -133,7 +105,6 @@ FIGURES: dict[str, Callable[[Run], str]] = {
         summary,
         setting,
         parts,
-        reading,
     )
 }
 """Blocks by name."""

@@ -171,10 +171,6 @@ def small_run(**changed):
     ]
     whole = {
         **{"complete": True, "suite": suite, "scores": scores, "measured": measured},
-        "rotation_reading": [
-            {"phase": phase, "measured": 4.0, "plain": 9.0, "read": 5.0}
-            for phase in PHASES["rotation"]
-        ],
     }
     return whole | changed
 

@@ -126,7 +126,7 @@ VAGUE = {
 """Identifiers that do not say what they name, and are gone from all folders but `WITH_VAGUE`."""
 
 WITH_VAGUE = (
-    *("benchmarks/hidden_effects/baselines", "benchmarks/training", "pma_gym/discovery"),
+    *("benchmarks/training", "pma_gym/discovery"),
     *("pma_gym/engine", "pma_gym/envs", "pma_gym/plant/exercise_device", "pma_gym/sb3", "tests"),
 )
 

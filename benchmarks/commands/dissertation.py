@@ -9,7 +9,6 @@ from benchmarks.commands.options import (
     Jobs,
     OptionalOut,
     Out,
-    Recompute,
     app,
 )
 from benchmarks.files import RESULTS
@@ -28,19 +27,13 @@ def measured(
     out: Annotated[Path, typer.Option(help="Folder of the results.")] = RESULTS / "measured",
     jobs: Jobs = 2,
     seed: Annotated[int, typer.Option(min=0, help="Seed of simulated chance.")] = 0,
-    rounds: Annotated[
-        int | None,
-        typer.Option(min=1, help="Diagnoses, each of what the one before amended; 2 if not given."),
-    ] = None,
     write: Annotated[
         Path | None,
         typer.Option(help="Write the trials to this folder, for pma-gym diagnose, and stop."),
     ] = None,
-    recompute: Recompute = False,
 ) -> None:
     """Diagnose the dissertation's tables I2 and I3; an interrupted run goes on where it stopped."""
     from benchmarks.measured.diagnose_tables import run_measured, write_trials
-    from benchmarks.measured.rounds import MOST_ROUNDS
 
     for folder, option in ((out, "--out"), (write, "--write")):
         if folder is not None and folder.exists() and not folder.is_dir():
@@ -48,7 +41,7 @@ def measured(
     if write is not None:
         print(f"{write_trials(write)} trials in {write}")
         return
-    run_measured(out, jobs, seed, rounds or MOST_ROUNDS, recompute=recompute)
+    run_measured(out, jobs, seed)
 
 
 @app.command(

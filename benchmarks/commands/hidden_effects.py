@@ -11,7 +11,6 @@ from benchmarks.commands.options import (
     Jobs,
     Recompute,
     app,
-    require_writable,
     writable_out,
 )
 from benchmarks.executors.choice import executor_named
@@ -26,8 +25,7 @@ def hidden_effects(
     block: Annotated[
         str,
         typer.Option(
-            help="single, faint, nothing, parameters, pair, unknown, slow_drift, undecidable, "
-            "rigs, or all."
+            help="single, faint, nothing, parameters, pair, unknown, slow_drift, rigs, or all."
         ),
     ],
     n: Annotated[int, typer.Option("--n", min=1, help="Cases of a block; more extend the set.")],
@@ -38,26 +36,19 @@ def hidden_effects(
         Path | None,
         typer.Option(help="Folder; results/hidden_effects/BLOCK-SEED if not given."),
     ] = None,
-    json_file: Annotated[
-        Path | None, typer.Option("--json", help="File for all figures, in a folder that exists.")
-    ] = None,
-    rounds: Annotated[
-        int, typer.Option(min=0, max=3, help="Experiments that follow, in block undecidable.")
-    ] = 2,
     keep: Annotated[bool, typer.Option("--keep", help="Keep the trials in FOLDER/data.")] = False,
     recompute: Recompute = False,
 ) -> None:
     """Hide effects in trials, diagnose them, count what was named right; goes on after Ctrl-C."""
     from benchmarks.hidden_effects.run_blocks import Order, ordered, run_hidden_effects
 
-    require_writable(json_file, "--json")
     places = executor_named(executor, jobs)
-    blocks, orders = ordered(block, rounds), []
+    blocks, orders = ordered(block), []
     for each in blocks:
         usual = (out or RESULTS / "hidden_effects") / f"{each.name}-{seed}"
         folder = usual if out is None or len(blocks) > 1 else out
         orders.append(Order(each, n, seed, folder, places, keep, recompute))
-    raise typer.Exit(run_hidden_effects(orders, json_file))
+    raise typer.Exit(run_hidden_effects(orders))
 
 
 @app.command(
@@ -66,7 +57,8 @@ def hidden_effects(
 )
 def hidden_effects_report(
     places: Annotated[
-        list[Path], typer.Argument(help="Folders or --json files of `hidden-effects`.")
+        list[Path],
+        typer.Argument(help="Folders of `hidden-effects`, or .json files of this command."),
     ],
     out: Annotated[
         Path | None,

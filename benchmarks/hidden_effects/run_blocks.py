@@ -11,13 +11,12 @@ from typing import Any
 from benchmarks.executors.executor import Executor, ThisProcess, run_all
 from benchmarks.files import UNREADABLE, reason, say_damaged, write_text
 from benchmarks.hidden_effects.evaluation import records, scoring
+from benchmarks.hidden_effects.evaluation.answers import Judge, Work, diagnosed
 from benchmarks.hidden_effects.evaluation.records import CaseRecord, measured_now
-from benchmarks.hidden_effects.evaluation.rounds import Judge, Work, diagnosed
 from benchmarks.hidden_effects.evaluation.summary import report
 from benchmarks.hidden_effects.evaluation.targets import RATES, percent
 from benchmarks.hidden_effects.evaluation.verdicts import Outcome
-from benchmarks.hidden_effects.generation.cases import Block
-from benchmarks.hidden_effects.generation.undecidable import BLOCKS
+from benchmarks.hidden_effects.generation.cases import BLOCKS, Block
 from benchmarks.runner.fingerprint import code_digest_with
 from pma_gym.document_shape import ListOf, ShapeError, Whole, check_shape
 from pma_gym.documents import read_json
@@ -61,21 +60,17 @@ class Order:
     judge: Judge = diagnosed
 
 
-def ordered(block: str, rounds: int = 0) -> list[Block]:
-    """Blocks of a name, all of them of `all`; where experiments may follow, so many.
+def ordered(block: str) -> list[Block]:
+    """Blocks of a name, all of them of `all`.
 
     Raises:
         JobError: there is no such block.
     """
     if block == ALL:
-        return [_with(each, rounds) for each in BLOCKS.values()]
+        return list(BLOCKS.values())
     if block not in BLOCKS:
         raise JobError(f"--block {block}: no such block; choose {', '.join([*BLOCKS, ALL])}")
-    return [_with(BLOCKS[block], rounds)]
-
-
-def _with(block: Block, rounds: int) -> Block:
-    return replace(block, rounds=rounds) if block.rounds else block
+    return [BLOCKS[block]]
 
 
 def run_block(order: Order) -> dict[str, Any] | None:
@@ -92,7 +87,7 @@ def run_block(order: Order) -> dict[str, Any] | None:
     done = {
         record.number: record
         for record in judgeable(order)
-        if (record.code == code or not order.recompute) and record.most_rounds >= order.block.rounds
+        if record.code == code or not order.recompute
     }
     _tell(_greeting(order, done, code))
     missing = [number for number in range(1, order.count + 1) if number not in done]
@@ -182,7 +177,7 @@ def read_scores(places: Sequence[Path]) -> dict[str, Any]:
         if not path.is_file():
             raise JobError(
                 f"{path}: there is no such file; name a folder in which `python -m benchmarks "
-                "hidden-effects` ended, or its --json file"
+                "hidden-effects` ended, or a .json file of hidden-effects-report"
             )
         try:
             document = read_json(path, "journal_mib", own=True)
@@ -205,7 +200,7 @@ def read_scores(places: Sequence[Path]) -> dict[str, Any]:
     return merged(documents)
 
 
-def run_hidden_effects(orders: Sequence[Order], json_file: Path | None) -> int:
+def run_hidden_effects(orders: Sequence[Order]) -> int:
     """Run blocks one after the other and print their figures.
 
     Returns:
@@ -213,17 +208,14 @@ def run_hidden_effects(orders: Sequence[Order], json_file: Path | None) -> int:
     Raises:
         JobError: a folder holds another set.
     """
-    documents = []
+    code = 0
     for order in orders:
         document = run_block(order)
         if document is None:
             return INTERRUPTED
-        documents.append(document)
         print(report(document), flush=True)
-    whole = merged(documents)
-    if json_file is not None:
-        write_text(json_file, json_text(whole))
-    return FAILED if whole["failures"] else 0
+        code = FAILED if document["failures"] else code
+    return code
 
 
 def json_text(document: dict[str, Any]) -> str:

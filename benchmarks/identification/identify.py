@@ -4,7 +4,6 @@ import math
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 from rich.console import Console
@@ -13,8 +12,7 @@ from rich.progress import Progress
 from benchmarks.executors.choice import local
 from benchmarks.executors.executor import run_or_raise
 from benchmarks.files import write_text
-from benchmarks.identification import statics, station
-from benchmarks.identification.creep import STUDENT_10, CreepFold, decided, load_cycle_with_creep
+from benchmarks.identification import station
 from benchmarks.identification.statics import StationLimits, station_limits
 from benchmarks.identification.station import fitted_parameters, identify, leave_out
 from benchmarks.identification.transients import PressureSteps, pressure_steps
@@ -23,6 +21,9 @@ from pma_gym.pages.document import TextTable
 from pma_gym.plant.model import Model, dump_model
 from pma_gym.plant.parameter_rows import Note
 from pma_gym.terminal import SafeConsole
+
+STUDENT_10 = 2.228
+"""97.5 % point of Student's t with 10 degrees of freedom: 11 pressures left out in turn."""
 
 DIGITS = 5
 """Significant digits of the values written. Correlated, they need more than their intervals bear:
@@ -48,31 +49,17 @@ def run_identify(out: Path, jobs: int = 2, console: Console | None = None) -> Mo
     start = fitted_parameters(whole)
     works = [partial(_fold, data, steps, float(pressure), start) for pressure in data.pressures]
     folds = _all_folds(works, jobs, console)
-    decision = decided([fold.creep for fold in folds])
-    if decision.asked:
-        whole = identify(data, steps, start, creeps=True)
-    chosen = [fold.creeping if decision.asked else fold.plain for fold in folds]
-    model = _noted(whole, [fitted_parameters(fold) for fold, _ in chosen])
-    judged = [errors for _, errors in chosen]
-    remarks = [decision.text, *station.unexplained(whole, data, steps)]
+    model = _noted(whole, [fitted_parameters(fitted) for fitted, _ in folds])
+    judged = [errors for _, errors in folds]
+    remarks = station.unexplained(whole, data, steps)
     write_text(out, _header(station.figures(judged), remarks) + dump_model(model))
     _print(console, model, judged, remarks)
     console.print(f"written: {out}")
     return model
 
 
-class Fold(NamedTuple):
-    """A pressure left out: models fitted without it, with what they miss there.
-
-    Attributes:
-        plain: without creep.
-        creeping: with creep.
-        creep: what says whether creep is asked for.
-    """
-
-    plain: tuple[Model, station.LeftOut]
-    creeping: tuple[Model, station.LeftOut]
-    creep: CreepFold
+Fold = tuple[Model, station.LeftOut]
+"""A model that was fitted without a pressure, and what it misses there."""
 
 
 def _all_folds(works: Sequence[partial[Fold]], jobs: int, console: Console) -> list[Fold]:
@@ -94,17 +81,8 @@ def _fold(
 ) -> Fold:
     """The station fitted without a pressure (Pa), and how it predicts that one."""
     others, here = leave_out(data, steps, pressure), data.rows(data.pressure == pressure)
-    none = steps.rows(np.zeros(len(steps.load), bool))
-    plain, creeping = (identify(*others, start, creeps) for creeps in (False, True))
-    missed = [
-        float(np.mean(statics.weighted(plain, here, none) ** 2)),
-        float(np.mean(statics.weighted(creeping, here, none, load_cycle_with_creep) ** 2)),
-    ]
-    return Fold(
-        (plain, station.left_out(plain, here)),
-        (creeping, station.left_out(creeping, here, load_cycle_with_creep)),
-        CreepFold(fitted_parameters(creeping)["creep.stiffness_n_per_mm"], *missed),
-    )
+    fitted = identify(*others, start)
+    return fitted, station.left_out(fitted, here)
 
 
 def _noted(model: Model, folds: list[dict[str, float]]) -> Model:

@@ -17,7 +17,6 @@ regulator's paces also make I2's transients (`transients`); neither table fixes 
 The measurements that identify the station: tables I1, I2 and I3, in SI.
 """
 
-from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
 from typing import NamedTuple
 
@@ -246,15 +245,9 @@ def load_cycle(model: Model, pressure: np.ndarray, load: np.ndarray) -> LoadCycl
     return LoadCycleReadings(x0, x0 - x1, x2 - x1)
 
 
-Predict = Callable[[Model, np.ndarray, np.ndarray], LoadCycleReadings]
-"""What predicts I3's load cycle from model, pressures (Pa) and loads (N)."""
-
-
-def residuals(
-    model: Model, data: StationLimits, predict: Predict = load_cycle
-) -> dict[str, np.ndarray]:
+def residuals(model: Model, data: StationLimits) -> dict[str, np.ndarray]:
     """Predicted less measured: no_load, extension, returned (mm), each of shape (rows,)."""
-    predicted = predict(model, data.pressure, data.load)
+    predicted = load_cycle(model, data.pressure, data.load)
     return {
         "no_load": (predicted.no_load - data.no_load) * 1e3,
         "extension": (predicted.extension - data.extension) * 1e3,
@@ -262,11 +255,9 @@ def residuals(
     }
 
 
-def weighted(
-    model: Model, data: StationLimits, steps: PressureSteps, predict: Predict = load_cycle
-) -> np.ndarray:
+def weighted(model: Model, data: StationLimits, steps: PressureSteps) -> np.ndarray:
     """Return the weighted residuals of a fit: of I3 (mm) and of I2, where measured."""
-    parts = residuals(model, data, predict)
+    parts = residuals(model, data)
     loop = parts["extension"] - parts["returned"]
     all_parts = (
         parts["no_load"],
@@ -283,8 +274,6 @@ def fit(
     data: StationLimits,
     steps: PressureSteps,
     start: dict[str, float] | None = None,
-    more: Mapping[str, tuple[float, float]] | None = None,
-    predict: Predict = load_cycle,
 ) -> Model:
     """The model with static force, hysteresis, damping and the regulator's paces fitted.
 
@@ -293,18 +282,15 @@ def fit(
         data: rows of I3.
         steps: rows of I2.
         start: values to start from, by parameter; `PARAMETERS` has the default.
-        more: parameters that are fitted beside `PARAMETERS`, as these.
-        predict: predicts I3's load cycle.
     """
-    fitted = {**PARAMETERS, **(more or {})}
-    names = list(fitted)
-    begin = np.array([(start or {}).get(n, fitted[n][0]) for n in names])
-    scale = np.array([fitted[n][1] for n in names])
+    names = list(PARAMETERS)
+    begin = np.array([(start or {}).get(n, PARAMETERS[n][0]) for n in names])
+    scale = np.array([PARAMETERS[n][1] for n in names])
     lower, upper = _bounds(model, names)
 
     def cost(values: np.ndarray) -> np.ndarray:
         tried = model.replace(dict(zip(names, values.tolist(), strict=True)))
-        return weighted(tried, data, steps, predict)
+        return weighted(tried, data, steps)
 
     solution = least_squares(
         cost,

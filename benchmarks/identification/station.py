@@ -6,7 +6,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from benchmarks.identification import statics
-from benchmarks.identification.creep import CREEP, HELD, load_cycle_with_creep
 from benchmarks.identification.statics import StationLimits, static_loading
 from benchmarks.identification.transients import PressureSteps, step_residuals
 from pma_gym.effects import CATALOGUE
@@ -34,11 +33,9 @@ class LeftOut:
     no_load: float
 
 
-def left_out(
-    model: Model, data: StationLimits, predict: statics.Predict = statics.load_cycle
-) -> LeftOut:
-    """Errors of a model at rows of one pressure, whose load cycle something predicts."""
-    predicted = predict(model, data.pressure, data.load)
+def left_out(model: Model, data: StationLimits) -> LeftOut:
+    """Errors of a model at rows of one pressure."""
+    predicted = statics.load_cycle(model, data.pressure, data.load)
     rotor, cable = model.parameters["rotor"], model.parameters["cable"]
     pulley = statics.Pulley(rotor.radius, cable.stiffness, cable.slack)
     rotation = pulley.rotation(predicted.extension, data.load) - data.rotation
@@ -159,10 +156,7 @@ def template() -> Model:
 
 
 def identify(
-    data: StationLimits,
-    steps: PressureSteps,
-    start: dict[str, float] | None = None,
-    creeps: bool = False,
+    data: StationLimits, steps: PressureSteps, start: dict[str, float] | None = None
 ) -> Model:
     """Fit everything that the tables tell of the station.
 
@@ -170,7 +164,6 @@ def identify(
         data: rows of I3.
         steps: rows of I2.
         start: values to start the static fit from.
-        creeps: whether the model has a branch of creep (`creep`).
     Returns:
         The station's model.
     """
@@ -178,10 +171,7 @@ def identify(
     values |= statics.pulley_parameters(statics.fit_pulley(data))
     model = template().replace(values)
     model = model.replace({"cable.damping_n_s_per_mm": cable_damping(model)})
-    if not creeps:
-        return statics.fit(model, data, steps, start)
-    model = model.with_effects({"creep": {path.partition(".")[2]: v for path, v in HELD.items()}})
-    return statics.fit(model, data, steps, start, CREEP, load_cycle_with_creep)
+    return statics.fit(model, data, steps, start)
 
 
 def cable_damping(model: Model) -> float:
@@ -195,8 +185,7 @@ def cable_damping(model: Model) -> float:
 
 def fitted_parameters(model: Model) -> dict[str, float]:
     """The values that the tables determine, by parameter, in file units."""
-    creeps = CREEP if "creep" in model.parameters else {}
-    return {name: _value(model, name) for name in [*statics.PARAMETERS, *creeps, *_LINES]}
+    return {name: _value(model, name) for name in [*statics.PARAMETERS, *_LINES]}
 
 
 _LINES = (

@@ -6,8 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pma_gym.data.datasets.dataset import Dataset, NamedTrial
-from pma_gym.data.trial import Trial
+from pma_gym.data.datasets.dataset import Dataset
 from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
 from pma_gym.discovery.fitting.fit_problem import FitProblem, Fitted
 from pma_gym.discovery.fitting.free_parameters import FreeParameters, free_parameters, values
@@ -76,7 +75,7 @@ class Rig:
             {each.name: each for each in candidate_effects(initial_model, orders)},
         )
 
-    def fit(self, effects: Sequence[str], start_model: Model) -> Fitted | None:
+    def _fit(self, effects: Sequence[str], start_model: Model) -> Fitted | None:
         """The given model with effects in it, fitted to the trials.
 
         Args:
@@ -94,10 +93,19 @@ class Rig:
         own = dict(zip(free, values(start_model, free).tolist(), strict=True))
         return self.problem.fit(self.initial_model.replace(own), chosen, starts)
 
+    def fit(self, effects: Sequence[str], amended: Model) -> Model:
+        """The better of fits of some effects that begin at an amended model and at the given one.
 
-AT_LOAD = "extension_at_load_mm"
-"""The extension again, with the load that was measured in each row: what the drive gives is no
-matter then."""
+        Raises:
+            ValueError: neither can be simulated on the trials.
+        """
+        fits = [self._fit(effects, model) for model in (amended, self.initial_model)]
+        if not any(fits):
+            raise ValueError(
+                f"{self.initial_model.name} with {', '.join(effects) or 'no effect'} cannot be "
+                "simulated on tables I2 and I3"
+            )
+        return min(filter(None, fits), key=lambda fit: fit.chi_square).model
 
 
 def _compared(readings: Sequence[Array], logged: Sequence[Logged]) -> dict[str, Array]:
@@ -113,37 +121,17 @@ def _compared(readings: Sequence[Array], logged: Sequence[Logged]) -> dict[str, 
 
 
 def limit_errors(model: Model, data: Dataset) -> dict[str, Array]:
-    """Compute predicted less measured of I3's trials from commands, by `FIGURES` and `AT_LOAD`.
+    """Compute predicted less measured of I3's trials from commands, in file units, by `FIGURES`.
 
     Args:
         model: as it is.
         data: trials of I3; those without a load are passed over.
     """
     loaded = [each for each in data.trials if each.trial.measures("angle")]
-    errors = _errors(model, loaded, [each.trial for each in loaded])
-    at_load = _errors(model, loaded, [_at_measured_load(each.trial, model) for each in loaded])
-    return {**errors, AT_LOAD: at_load["extension_mm"]}
-
-
-def _at_measured_load(trial: Trial, model: Model) -> Trial:
-    """A trial of I3 whose drive gives the load that was measured in place of the usual one."""
-    volts, drive = trial.commands["motor_voltage"], model.parameters["drive"]
-    scaled = (
-        np.clip((trial.measurements["load"][LOADED] - drive.offset) / drive.gain, 0.0, 10.0)
-        * volts
-        / volts.max()
-    )
-    return Trial(trial.time, {**trial.commands, "motor_voltage": scaled}, trial.measurements)
-
-
-def _errors(
-    model: Model, loaded: Sequence[NamedTrial], trials: Sequence[Trial]
-) -> dict[str, Array]:
-    """Predicted less measured, in file units, by `FIGURES`."""
     some = ("drive.offset_n",)
     whitened = WhitenedResiduals(
         model,
-        trials,
+        [each.trial for each in loaded],
         some,
         tuple(white_noise(1.0) for _ in RIGS["station"].outputs),
         np.array([np.inf]),
@@ -186,4 +174,4 @@ def repeat_scatter(data: Dataset) -> dict[str, float]:
             squares += float(np.sum((apart - apart.mean()) ** 2)) if apart.size else 0.0
             count += apart.size
         scatter[name] = float(np.sqrt(squares / count)) if count else float("nan")
-    return {**scatter, AT_LOAD: scatter["extension_mm"]}
+    return scatter

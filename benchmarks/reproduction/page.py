@@ -5,13 +5,11 @@ from typing import Any
 
 from benchmarks.reproduction.plots import (
     actual_against_ideal_plot,
-    replay_plot,
     rmse_figure,
     rmse_plot,
     tracking_figure,
     tracking_plot,
 )
-from benchmarks.reproduction.replay import all_replay_errors
 from benchmarks.reproduction.replay_page import replay_blocks
 from benchmarks.reproduction.results import Results
 from benchmarks.reproduction.tables import regression_table, rmse_table, summary_table
@@ -52,8 +50,6 @@ def report_pictures(results: Results) -> dict[str, Plot]:
         if any(results.trials(task, pressure) for pressure in pressures):
             pictures[f"tracking_{task}"] = tracking_plot(results, task)
             pictures[f"actual_against_ideal_{task}"] = actual_against_ideal_plot(results, task)
-    if all_replay_errors(results, results.suite.models[0]):
-        pictures["replay_errors"] = replay_plot(results)
     return pictures
 
 

@@ -10,11 +10,10 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
-from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
 from benchmarks.report.plots import BOUND, MEASURED, REFERENCE, Style, controller_styles
-from benchmarks.reproduction.replay import QUANTITIES, all_replay_errors, summarise
+from benchmarks.reproduction.replay import QUANTITIES, all_replay_errors
 from benchmarks.reproduction.results import Results
 from benchmarks.runner.phase_score import PHASES, UNITS, measured_score
 from pma_gym.data.trial import Trial
@@ -71,33 +70,6 @@ def rmse_plot(results: Results, task: str) -> Plot:
         if "III" in phases and results.bounds:
             handles.append(Line2D([], [], label="Achievable bound", **BOUND))
         legend_below(figure, handles, min(len(handles), 6))
-        return figure
-
-
-def replay_plot(results: Results) -> Plot:
-    """Signed errors of the replay: a row a quantity, a column a phase, a bar a trial."""
-    errors = all_replay_errors(results, results.suite.models[0])
-    color = controller_styles(results.suite)[results.suite.goals.replay].color
-    with picture(11.0, 12.4) as figure:
-        axes: Any = figure.subplots(len(QUANTITIES), len(errors), sharex="col", squeeze=False)
-        for column, ((task, phase), trials) in enumerate(errors.items()):
-            places = np.arange(len(trials))
-            means = summarise(trials).signed
-            name = "displacement" if task == "displacement" else f"rotation, phase {phase}"
-            axes[0, column].set_title(name)
-            for row, quantity in enumerate(QUANTITIES):
-                axis = axes[row, column]
-                axis.bar(places, [getattr(t, quantity) for t in trials], 0.7, color=color)
-                axis.axhline(0.0, color="black", linewidth=0.9)
-                axis.axhline(means[quantity], color=_GREY, linewidth=1.2, linestyle=(0, (4, 2)))
-                axis.set_ylabel(QUANTITY_LABELS[quantity].format(unit=UNITS[task]))
-                axis.grid(visible=False, axis="x")
-            labels = [f"{trial.pressure_kpa:g}" for trial in trials]
-            axes[-1, column].set_xticks(places, labels, rotation=90)
-            axes[-1, column].set_xlabel("pressure (kPa)")
-        figure.align_ylabels()
-        mean = Line2D([], [], color=_GREY, linestyle=(0, (4, 2)), label="mean over the trials")
-        legend_below(figure, [Patch(color=color, label="simulated less measured"), mean], 2)
         return figure
 
 

@@ -6,10 +6,9 @@ from statistics import fmean
 from benchmarks.reproduction.plots import replay_figure
 from benchmarks.reproduction.replay import ReplayError, all_replay_errors, summarise, table_angle
 from benchmarks.reproduction.results import Results
-from benchmarks.reproduction.rotation_reading import reading_blocks
 from benchmarks.reproduction.tables import MISSING, RULE, replay_table
 from benchmarks.runner.phase_score import UNITS, PhaseScore, measured_score
-from pma_gym.pages.document import Block, Heading, Paragraph, Picture, TextTable
+from pma_gym.pages.document import Block, Heading, Paragraph, TextTable
 from pma_gym.plant.model import shipped_models
 
 PARTS = ("rmse", "line_error", "scatter")
@@ -76,7 +75,6 @@ def replay_blocks(results: Results) -> list[Block]:
             f"The dissertation's printed voltages drive `{model}`; what comes out is compared "
             f"with what the real station did. Errors are simulated less measured. {_origin(model)}"
         ),
-        Picture("replay_errors", "Errors of the replay, trial by trial.", printed=True),
         replay_figure(results),
     ]
     displacement = errors.get(("displacement", "displacement"))
@@ -89,7 +87,6 @@ def replay_blocks(results: Results) -> list[Block]:
     phase_errors = errors.get(("rotation", "II"))
     if phase_errors:
         blocks += _hold_blocks(results, phase_errors)
-        blocks += reading_blocks(model)
     return blocks
 
 

@@ -15,7 +15,6 @@ from benchmarks.files import write_bytes, write_text
 from benchmarks.reproduction.page import report_blocks, report_pictures
 from benchmarks.reproduction.replay import all_replay_errors
 from benchmarks.reproduction.results import Results, Score, json_text, scores_csv, scores_of
-from benchmarks.reproduction.rotation_reading import entries
 from benchmarks.reproduction.tables import summary_table
 from benchmarks.reproduction.targets import Check, check_targets
 from benchmarks.runner.case import Case, drive
@@ -80,7 +79,6 @@ def write_report(results: Results, out: Path, vector: bool = False) -> None:
             results,
             targets=[asdict(check) | {"verdict": check.verdict} for check in checks],
             replay_errors=[asdict(error) for trials in errors.values() for error in trials],
-            rotation_reading=entries(results.suite.models[0]) if errors else [],
         ),
     }
     shutil.rmtree(out / PLOTS, ignore_errors=True)

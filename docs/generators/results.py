@@ -1,15 +1,13 @@
 """Kept figures of the diagnosis; the exercise device's tables and the shipped policies."""
 
-import json
 from pathlib import Path
-from typing import Any
 
 from benchmarks.exercise.choose_device import Choice
 from benchmarks.exercise.safety_episodes import Safety
 from benchmarks.exercise.safety_layer import read_safety, safety_table, safety_text
 from benchmarks.exercise.tables import check_table, knee_table, makers_table, range_table
 from benchmarks.hidden_effects.evaluation.records import measured_text
-from benchmarks.hidden_effects.evaluation.summary import diagnosis, measured_in, report_blocks
+from benchmarks.hidden_effects.evaluation.summary import diagnosis
 from controllers.policies.policy_file import load_policy_file
 from controllers.policy import shipped_policies
 from generators.text import code, table
@@ -18,88 +16,20 @@ from pma_gym.plant.model import load_model
 from pma_gym.studies.moment_ranges import check_moments
 from pma_gym.tasks import OPERATOR_BOUNDS, PACED, PACING, Operator, Population
 
-FIGURES = Path(__file__).parents[1] / "figures"
-
-
-def _read(name: str) -> dict[str, Any]:
-    return json.loads((FIGURES / f"{name}.json").read_text("utf-8"))
-
-
-def hidden_rates() -> str:
-    """Every figure with its target, block by block."""
-    every = report_blocks(_read("hidden-effects"))
-    tables = [each for each in every if isinstance(each, TextTable)]
-    return to_markdown(tables[:1], {}, "") + _measured()
-
 
 def hidden_summary() -> str:
     """The rate of each block that says most."""
     return diagnosis()
 
 
-def hidden_table(block: str, *title: str) -> str:
-    """The table of a block whose title begins so, as the report has it."""
-    document = _read("hidden-effects")
-    alone = {**document, "blocks": {block: document["blocks"][block]}}
-    tables = [
-        each
-        for each in report_blocks(alone)
-        if isinstance(each, TextTable) and each.title.startswith(" ".join(title))
-    ]
-    return to_markdown(tables, {}, "") + _measured(block)
-
-
-def _measured(*names: str) -> str:
-    """A sentence on what blocks were measured with, all if none is named."""
-    blocks = _read("hidden-effects")["blocks"]
-    return "\n" + measured_text(measured_in({name: blocks[name] for name in names or blocks}))
-
-
 def hidden_measured(*some: str) -> str:
-    """The same sentence for figures that a page has in its text.
+    """By which commits figures were measured that a page has in its text.
 
     Args:
         some: COMMIT/DATE/METHOD of each measurement; METHOD is the digest.
     """
     names = ("commit", "date", "method")
     return measured_text(dict(zip(names, each.split("/"), strict=True)) for each in some)
-
-
-def hidden_seconds() -> str:
-    """How long a diagnosis took on one core, by block."""
-    blocks = _read("hidden-effects")["blocks"]
-    times = {name: each["seconds"] for name, each in blocks.items()}
-    rows = [
-        [code(name), blocks[name]["n"], f"{each['median']:.1f}", f"{each['most']:.0f}"]
-        for name, each in times.items()
-    ]
-    return table(["Block", "Cases", "Median (s)", "Most (s)"], rows, (1, 2, 3)) + "\n" + _measured()
-
-
-def hidden_confused() -> str:
-    """What was taken for what, in the blocks that hide one effect, and how often."""
-    blocks = _read("hidden-effects")["blocks"]
-    counts: dict[tuple[str, str], list[int]] = {}
-    shown = ("single", "faint")
-    for place, block in enumerate(shown):
-        for hidden, said in blocks[block]["confusion"].items():
-            for other, number in said.items():
-                if other != hidden:
-                    counts.setdefault((hidden, other), [0, 0])[place] += number
-    rows = [[code(hidden), code(said), *each] for (hidden, said), each in sorted(counts.items())]
-    header = ["Hidden", "Said", *(code(each) for each in shown)]
-    return table(header, rows, (2, 3)) + "\n" + _measured(*shown)
-
-
-def hidden_misses() -> str:
-    """Every case in which the diagnosis did not say what it should."""
-    rows = [
-        [name, miss["number"], miss["hidden"], "" if miss["r"] is None else f"{miss['r']:.2f}"]
-        + [miss["said"]]
-        for name, block in _read("hidden-effects")["blocks"].items()
-        for miss in block["misses"]
-    ]
-    return table(["Block", "Case", "Hidden", "r", "Said"], rows, (1, 3)) + "\n" + _measured()
 
 
 def exercise_check() -> str:

@@ -11,9 +11,9 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import pma_gym.envs  # noqa: F401
+from benchmarks.hidden_effects.generation.cases import BLOCKS
 from benchmarks.hidden_effects.generation.files import write_case
 from benchmarks.hidden_effects.generation.groups import group
-from benchmarks.hidden_effects.generation.undecidable import BLOCKS
 from pma_gym.data.datasets.dataset import Dataset, NamedTrial, read_dataset
 from pma_gym.data.files.trial_files import write_trial
 from pma_gym.data.quality.clipping import ends

@@ -68,10 +68,8 @@ class CaseRecord:
         truth: what was hidden.
         answer: essentials of the diagnosis; None where it gave none.
         message: why it gave none.
-        rounds: results of the experiments that followed, by who chose them.
         seconds: to draw it, to read and to diagnose it.
         code: fingerprint of the code that made it.
-        most_rounds: how many experiments could follow.
         measured: commit, date and method that answered it.
     """
 
@@ -79,10 +77,8 @@ class CaseRecord:
     truth: dict[str, Any]
     answer: dict[str, Any] | None
     message: str = ""
-    rounds: dict[str, list[dict[str, Any]]] = field(default_factory=dict)
     seconds: dict[str, float] = field(default_factory=dict)
     code: str = ""
-    most_rounds: int = 0
     measured: dict[str, str] = field(default_factory=lambda: dict(UNKNOWN))
 
 
@@ -95,7 +91,6 @@ def essentials(document: Mapping[str, Any]) -> dict[str, Any]:
     return {name: document[name] for name in ESSENTIALS} | {
         "parameters": moved,
         "candidates": document["candidates"][:CANDIDATES],
-        "next_experiment": document["next_experiment"],
     }
 
 

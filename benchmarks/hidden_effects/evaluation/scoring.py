@@ -4,7 +4,6 @@ Plots of what was named, against the size of the effect.
 """
 
 import math
-from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import pairwise
 from typing import Any
@@ -21,7 +20,7 @@ from benchmarks.hidden_effects.evaluation.targets import (
     SIZE_ERROR,
     Target,
 )
-from benchmarks.hidden_effects.evaluation.verdicts import Outcome, compare, judged, no_answer
+from benchmarks.hidden_effects.evaluation.verdicts import Outcome, compare, no_answer
 from pma_gym.pages.figures import legend_below, picture, png
 
 Z = 1.959964
@@ -31,19 +30,12 @@ Z = 1.959964
 SIZES = (0.0, 0.25, 0.4, 0.7, 1.0, 1.5, 2.5, 100.0)
 """Edges of the ranges of r that rates are counted in."""
 
-LEAST_ROUNDS = 2
-"""Rounds that a mean counts to, at least: one that ended before did not settle later."""
-
 
 def outcome_of(record: CaseRecord) -> Outcome:
     """The outcome of a case that the job kept."""
     answer = no_answer(record.message) if record.answer is None else record.answer
     outcome = compare(record.truth, answer)
     outcome.number = record.number
-    outcome.rounds = {
-        chooser: [{**each, **judged(each["said"], outcome.truth)} for each in rounds]
-        for chooser, rounds in record.rounds.items()
-    }
     outcome.seconds = record.seconds.get("diagnose")
     return outcome
 
@@ -83,16 +75,10 @@ def _block(name: str, outcomes: Sequence[Outcome]) -> dict[str, Any]:
     return {
         "n": len(some),
         "rates": {each.name: rate(map(each.hit, some), each.target) for each in rates},
-        "verdicts": dict(Counter(outcome.verdict for outcome in some).most_common()),
-        "confusion": _confusion(some),
-        "by_effect": _by_effect(some),
         "by_size": _by_size(some),
         "gap_closed": _gap_closed(name, some),
         "sizes": _sizes(some),
         "seconds": _seconds(some),
-        "by_kind": _by_kind(some),
-        "rounds": _rounds(some),
-        "by_parameter_off": _by_parameter_off(some),
         "misses": [_miss(outcome) for outcome in some if _missed(outcome)],
         "unanswered": [_miss(outcome) for outcome in some if not outcome.answered],
     }
@@ -107,14 +93,6 @@ def _beside(value: float | None, target: Target | None) -> dict[str, Any]:
 
 def _amount(value: float | None, target: Target | None) -> dict[str, Any]:
     return {"value": value} | _beside(value, target)
-
-
-def _confusion(some: Sequence[Outcome]) -> dict[str, dict[str, int]]:
-    """How often each hidden thing was said to be what, verdicts that name nothing among it."""
-    counts: dict[str, Counter[str]] = {}
-    for outcome in some:
-        counts.setdefault(outcome.hidden, Counter())[outcome.said] += 1
-    return {name: dict(said.most_common()) for name, said in sorted(counts.items())}
 
 
 def _by_size(some: Sequence[Outcome]) -> list[dict[str, Any]]:
@@ -134,19 +112,6 @@ def _by_size(some: Sequence[Outcome]) -> list[dict[str, Any]]:
             }
             rows.append({"low": low, "high": high, **counted})
     return rows
-
-
-def _by_effect(some: Sequence[Outcome]) -> dict[str, Any]:
-    """How often each hidden effect was named, and named or its group."""
-    names = sorted({name for outcome in some for name in outcome.truth})
-    return {
-        name: {
-            "named": rate(name in o.named for o in some if name in o.truth),
-            "named or its group": rate(o.near or name in o.named for o in some if name in o.truth),
-            "detected": rate(o.detected for o in some if name in o.truth),
-        }
-        for name in names
-    }
 
 
 def _gap_closed(name: str, some: Sequence[Outcome]) -> dict[str, Any]:
@@ -190,51 +155,6 @@ def _sizes(some: Sequence[Outcome]) -> dict[str, Any]:
     }
 
 
-def _by_kind(some: Sequence[Outcome]) -> dict[str, Any]:
-    """What was said of each kind of data that excite too little, and how often `undecidable`."""
-    kinds = sorted({outcome.kind for outcome in some if outcome.kind})
-    return {
-        kind: rate(o.verdict == "undecidable" for o in some if o.kind == kind)
-        | {"verdicts": dict(Counter(o.verdict for o in some if o.kind == kind).most_common())}
-        for kind in kinds
-    }
-
-
-def _rounds(some: Sequence[Outcome]) -> dict[str, Any]:
-    """How far experiments that followed settled the cases in which one was asked for."""
-    asked = [outcome for outcome in some if outcome.rounds]
-    most = max([LEAST_ROUNDS, *(len(r) for o in asked for r in o.rounds.values())])
-    figures: dict[str, Any] = {"asked": rate(bool(outcome.rounds) for outcome in some)}
-    for chooser in sorted({chooser for outcome in asked for chooser in outcome.rounds}):
-        needed = [outcome.rounds_of(chooser, most) for outcome in asked]
-        figures[chooser] = {
-            "settled": {k: rate(n <= k for n in needed) for k in range(1, most + 1)},
-            "wrong": rate(any(each["wrong"] for each in o.rounds[chooser]) for o in asked),
-            "mean_rounds": float(np.mean(needed)),
-        }
-    if asked:
-        pairs = [(o.rounds_of("proposed", most), o.rounds_of("random", most)) for o in asked]
-        figures["faster"] = rate(mine < other for mine, other in pairs)
-        figures["slower"] = rate(mine > other for mine, other in pairs)
-    return figures
-
-
-def _by_parameter_off(some: Sequence[Outcome]) -> dict[str, Any]:
-    """How often each base parameter that was off was named, and what was where it was not."""
-    names = sorted({name for outcome in some for name in outcome.off})
-    rows: dict[str, Any] = {}
-    for name in names:
-        those = [outcome for outcome in some if name in outcome.off]
-        without = [outcome for outcome in those if name in outcome.missing]
-        instead = Counter(path for outcome in without for path in outcome.beyond)
-        rows[name] = {
-            "named": rate(name not in outcome.missing for outcome in those),
-            "instead": dict(instead.most_common()),
-            "nothing_instead": sum(not outcome.beyond for outcome in without),
-        }
-    return rows
-
-
 def _missed(outcome: Outcome) -> bool:
     """Whether a case is one that the block's target speaks against."""
     if not outcome.answered:
@@ -247,8 +167,8 @@ def _missed(outcome: Outcome) -> bool:
         return not (outcome.near or outcome.verdict == "unknown")
     if outcome.block.startswith("single") or outcome.block in ("faint", "pair"):
         return not outcome.right
-    if outcome.block in ("unknown", "undecidable"):
-        return outcome.verdict != outcome.block
+    if outcome.block == "unknown":
+        return outcome.verdict != "unknown"
     if outcome.block == "parameters":
         return outcome.detected or outcome.parameters is False
     return outcome.detected

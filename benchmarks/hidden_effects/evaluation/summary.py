@@ -6,12 +6,12 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.hidden_effects.evaluation.records import Measured, measured_text
-from benchmarks.hidden_effects.evaluation.targets import instead, listed, percent
+from benchmarks.hidden_effects.evaluation.targets import percent
 from pma_gym.documents import read_json
 from pma_gym.pages.document import Block, Heading, Paragraph, TextTable, to_html, to_markdown
 
 KEPT = Path(__file__).resolve().parents[3] / "docs" / "figures" / "hidden-effects.json"
-"""What runs of `hidden-effects --json` wrote of their blocks, put together."""
+"""What `hidden-effects-report --out FILE.json` wrote of the blocks."""
 
 ROWS = (
     ("one effect, 0.5 to 2 noises: named", "single", "named right"),
@@ -104,55 +104,15 @@ def _verdict(figure: dict[str, Any]) -> list[str]:
 
 def _own(figures: dict[str, Any]) -> list[Block]:
     seconds = figures["seconds"]
-    text = f"{figures['n']} cases; verdicts: {listed(figures['verdicts'])}."
+    text = f"{figures['n']} cases."
     if seconds["median"] is not None:
         text += f" A diagnosis took {seconds['median']:.1f} s (median), {seconds['most']:.1f} s"
         text += " at most."
-    rounds = figures["rounds"] if "proposed" in figures["rounds"] else {}
     tables: list[tuple[Any, Any]] = [
-        (figures["by_effect"], _by_effect),
-        (figures["by_size"] if len(figures["by_size"]) > 1 else [], _by_size),
         (figures["sizes"]["by_parameter"], _sizes),
-        (figures["by_kind"], _by_kind),
-        (figures["by_parameter_off"], _by_parameter_off),
-        (rounds, _rounds),
         (figures["misses"], _misses),
     ]
-    shown = [table(some) for some, table in tables if some]
-    return [Paragraph(text), _confusion(figures["confusion"]), *shown]
-
-
-def _confusion(confusion: dict[str, dict[str, int]]) -> TextTable:
-    rows = [
-        [hidden, str(sum(said.values())), str(said.get(hidden, 0)), listed(_without(said, hidden))]
-        for hidden, said in confusion.items()
-    ]
-    return TextTable(
-        "What was hidden, and what was said",
-        ["hidden", "cases", "named so", "said otherwise"],
-        rows,
-    )
-
-
-def _without(said: dict[str, int], name: str) -> dict[str, int]:
-    return {each: n for each, n in said.items() if each != name}
-
-
-def _by_effect(effects: dict[str, Any]) -> TextTable:
-    kinds = ["named", "named or its group", "detected"]
-    rows = [
-        [name, *(percent(figures[kind]) for kind in kinds)] for name, figures in effects.items()
-    ]
-    return TextTable("By effect", ["hidden", *kinds], rows)
-
-
-def _by_size(ranges: list[dict[str, Any]]) -> TextTable:
-    kinds = ["named", "named or its group", "detected"]
-    rows = [
-        [f"{each['low']:g} to {each['high']:g}", *(percent(each[kind]) for kind in kinds)]
-        for each in ranges
-    ]
-    return TextTable("By size r of what is hidden", ["r", *kinds], rows)
+    return [Paragraph(text), *(table(some) for some, table in tables if some)]
 
 
 def _sizes(parameters: dict[str, Any]) -> TextTable:
@@ -161,38 +121,6 @@ def _sizes(parameters: dict[str, Any]) -> TextTable:
         for name, each in parameters.items()
     ]
     return TextTable("Fitted sizes", ["parameter", "median error", "intervals cover"], rows)
-
-
-def _by_kind(kinds: dict[str, Any]) -> TextTable:
-    rows = [[kind, percent(each), listed(each["verdicts"])] for kind, each in kinds.items()]
-    return TextTable("By kind of data", ["data", "undecidable", "verdicts"], rows)
-
-
-def _by_parameter_off(parameters: dict[str, Any]) -> TextTable:
-    rows = [[name, percent(each["named"]), instead(each)] for name, each in parameters.items()]
-    return TextTable(
-        "By parameter", ["off by a tenth", "named", "named where it was not, and was right"], rows
-    )
-
-
-def _rounds(rounds: dict[str, Any]) -> TextTable:
-    counted = list(rounds["proposed"]["settled"])
-    rows = [
-        [
-            chooser,
-            *(percent(rounds[chooser]["settled"][k]) for k in counted),
-            f"{rounds[chooser]['mean_rounds']:.2f}",
-            percent(rounds[chooser]["wrong"]),
-        ]
-        for chooser in ("proposed", "random")
-    ]
-    header = [
-        "experiment",
-        *(f"settled within {k}" for k in counted),
-        "mean rounds",
-        "named wrongly",
-    ]
-    return TextTable(f"Rounds; asked for in {percent(rounds['asked'])}", header, rows)
 
 
 def _misses(misses: list[dict[str, Any]]) -> TextTable:

@@ -47,11 +47,6 @@ class Rate:
     target: Target | None = None
 
 
-def _within(hit: Callable[[Outcome], bool | None]) -> Callable[[Outcome], bool | None]:
-    """The same of those cases alone whose effect is as large as the block promises."""
-    return lambda outcome: hit(outcome) if outcome.strong else None
-
-
 _SINGLE = (
     Rate("named right", lambda o: o.right, Target(least=0.92)),
     Rate("right or in its group", lambda o: o.near, Target(least=0.98)),
@@ -59,8 +54,6 @@ _SINGLE = (
     Rate("confidently wrong", lambda o: o.wrong, Target(most=0.02)),
     Rate("detected", lambda o: o.detected),
     Rate("a spurious second", lambda o: o.spurious),
-    Rate("named right, r as promised", _within(lambda o: o.right)),
-    Rate("right or in its group, r as promised", _within(lambda o: o.near)),
 )
 
 _FAINT = (
@@ -69,7 +62,6 @@ _FAINT = (
     Rate("named right", lambda o: o.right),
     Rate("right or in its group", lambda o: o.near),
     Rate("... or said to be what may be meant", lambda o: o.beside),
-    Rate("detected, r as promised", _within(lambda o: o.detected)),
 )
 
 _NOTHING = (
@@ -124,15 +116,6 @@ _UNKNOWN = (
     Rate("detected", lambda o: o.detected),
 )
 
-_UNDECIDABLE = (
-    Rate("undecidable", lambda o: o.verdict == "undecidable", Target(least=0.95)),
-    Rate("a false name", lambda o: o.wrong),
-    Rate("proposed, settled in 2 rounds", lambda o: o.settled_by("proposed", 2), Target(least=0.8)),
-    Rate("proposed, settled in 1 round", lambda o: o.settled_by("proposed", 1)),
-    Rate("random, settled in 2 rounds", lambda o: o.settled_by("random", 2)),
-    Rate("random, settled in 1 round", lambda o: o.settled_by("random", 1)),
-)
-
 
 def _of(kind: str, hit: Callable[[Outcome], bool | None]) -> Callable[[Outcome], bool | None]:
     """The same of the cases of one kind alone."""
@@ -174,7 +157,6 @@ RATES: dict[str, tuple[Rate, ...]] = {
     **{f"single_{ugly}": _SINGLE_UGLY for ugly in UGLY},
     **{f"nothing_{ugly}": _NOTHING_UGLY for ugly in UGLY},
     "slow_drift": _SLOW_DRIFT,
-    "undecidable": _UNDECIDABLE,
     "rigs": _RIGS,
 }
 """By block."""
@@ -196,14 +178,3 @@ def percent(figure: dict[str, Any]) -> str:
     low, high = 100 * figure["low"], 100 * figure["high"]
     share = 100 * figure["rate"]
     return f"{share:.1f} % ({low:.1f}-{high:.1f}), {figure['hits']} of {figure['n']}"
-
-
-def listed(counts: dict[str, int]) -> str:
-    """Counts by name: `creep 14, unknown 1`."""
-    return ", ".join(f"{name} {n}" for name, n in counts.items())
-
-
-def instead(off: dict[str, Any]) -> str:
-    """What was named where a parameter that was off was not: `cable.stiffness 2, nothing 1`."""
-    nothing = {"nothing": off["nothing_instead"]} if off["nothing_instead"] else {}
-    return listed(off["instead"] | nothing) or "-"

@@ -2,13 +2,12 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, get_args
+from typing import Any
 
 from benchmarks.hidden_effects.generation.effect_size import UNTOLD
 from benchmarks.hidden_effects.generation.effects import ALL
 from benchmarks.hidden_effects.generation.groups import expected, group
 from benchmarks.hidden_effects.rigs import effect_size
-from pma_gym.discovery.diagnosis import Verdict
 
 STRUCTURAL = ("effect", "unknown")
 """Verdicts that claim more than parameters."""
@@ -21,9 +20,6 @@ MOST_LEFT = 3.0
 
 NO_ANSWER = "no answer"
 """Verdict where the diagnosis raised an error."""
-
-VERDICTS = (*get_args(Verdict), NO_ANSWER)
-"""What is said where nothing is named."""
 
 PATHS: dict[str, tuple[str, ...]] = {
     "force_slope": ("contractile_force.slope",),
@@ -42,12 +38,6 @@ PATHS: dict[str, tuple[str, ...]] = {
 
 VISIBLE = 0.2
 """A signal's gap counts where it is larger than the floor by this share."""
-
-LEAST_RATIO = {"faint": 0.3}
-"""r that a block promises of its effects, at least; 0.5 in the others."""
-
-NEAR_RATIO = 0.95
-"""Share of it that is near enough."""
 
 
 @dataclass
@@ -77,16 +67,13 @@ class Outcome:
         seconds: how long the diagnosis took.
         number: of the case in its set.
         ratio: the smallest r of what is hidden, None where nothing is.
-        strong: whether each hidden effect is as large as its block promises.
         answered: whether there was an answer; without one it hits nothing and claims nothing.
         off: base parameters that were off by a tenth, where nothing else is hidden.
         moved: paths of base parameters that are named as off, in such a block.
         sentence: the answer as a person would say it, or what was raised instead.
-        kind: of data that excite too little, or of what a rig of another lab hides; empty
-            elsewhere.
+        kind: of what a rig of another lab hides; empty elsewhere.
         left: the largest misfit of a signal after the amended model, over its noise; None where
             the truth has no noise.
-        rounds: results of the experiments that followed, by who chose them.
     """
 
     block: str
@@ -110,13 +97,11 @@ class Outcome:
     seconds: float | None = None
     number: int = 0
     ratio: float | None = None
-    strong: bool = True
     answered: bool = True
     off: tuple[str, ...] = ()
     moved: tuple[str, ...] = ()
     kind: str = ""
     left: float | None = None
-    rounds: Mapping[str, Sequence[Mapping[str, Any]]] = field(default_factory=dict)
     sentence: str = ""
 
     @property
@@ -152,16 +137,6 @@ class Outcome:
         """Base parameters that were off and are not named."""
         return tuple(name for name in self.off if not _all_start_with(self.moved, PATHS[name]))
 
-    def settled_by(self, chooser: str, most: int) -> bool:
-        """Whether the truth or its group was named within so many rounds of a way, or at once."""
-        if self.verdict == "effect" and self.near:
-            return True
-        return any(each["settled"] for each in self.rounds.get(chooser, ())[:most])
-
-    def rounds_of(self, chooser: str, most: int) -> int:
-        """In which round the truth or its group was named; one more than most if in none."""
-        return next((k for k in range(most + 1) if self.settled_by(chooser, k)), most + 1)
-
 
 def compare(truth: Mapping[str, Any], answer: Mapping[str, Any]) -> Outcome:
     """The outcome of a case from its truth and its `diagnosis.json`."""
@@ -179,7 +154,6 @@ def compare(truth: Mapping[str, Any], answer: Mapping[str, Any]) -> Outcome:
     beside = any(meant & {effect["name"], *effect["confused_with"][:2]} for effect in effects[:1])
     right = bool(hidden) and sorted(named) == sorted(hidden)
     block, ratios = truth["block"], [e["r"] for e in truth["effects"] if "r" in e]
-    least = NEAR_RATIO * LEAST_RATIO.get(block, 0.5)
     odds = list((truth.get("log_odds") or {}).values())
     outcome = Outcome(
         block=block,
@@ -189,7 +163,6 @@ def compare(truth: Mapping[str, Any], answer: Mapping[str, Any]) -> Outcome:
         parameters_tellable=min(odds) > UNTOLD if odds else None,
         off=tuple(_off(truth)) if block == "parameters" else (),
         kind=truth.get("kind", ""),
-        strong=all(ratio >= least for ratio in ratios),
         verdict=verdict,
         named=named,
         right=right,
@@ -214,21 +187,6 @@ def compare(truth: Mapping[str, Any], answer: Mapping[str, Any]) -> Outcome:
 def no_answer(message: str) -> dict[str, Any]:
     """What stands for the answer of a diagnosis that raised an error: no hit, and no claim."""
     return {"verdict": NO_ANSWER, "effects": [], "parameters": {}, "gap": {}, "sentence": message}
-
-
-def of_group(named: Sequence[str], hidden: Sequence[str]) -> bool:
-    """Whether one of some names is of the group of one that is hidden."""
-    return any(name in group(truth) for truth in hidden for name in named)
-
-
-def judged(said: str, hidden: Sequence[str]) -> dict[str, bool]:
-    """Whether what was said, as `Outcome.said` has it, settles what is hidden, or is wrong.
-
-    It settles where it names the truth or its group and nothing else; it is wrong where it names
-    something and does not settle.
-    """
-    settled = all(of_group([name], hidden) for name in said.split(" + "))
-    return {"settled": settled, "wrong": not settled and said not in VERDICTS}
 
 
 def _off(truth: Mapping[str, Any]) -> list[str]:

@@ -21,7 +21,7 @@ from benchmarks.hidden_effects.generation.effect_size import (
 )
 from benchmarks.hidden_effects.generation.effects import ALL, KINDS, OUTSIDE, Values
 from benchmarks.hidden_effects.generation.excitation import EXCITATIONS, draw_trial
-from benchmarks.hidden_effects.generation.readout_noise import NONE, UGLY, ReadoutNoise, draw_noise
+from benchmarks.hidden_effects.generation.readout_noise import UGLY, ReadoutNoise, draw_noise
 from benchmarks.hidden_effects.physics import rig as rigs
 from benchmarks.hidden_effects.physics.rig import NOMINAL, SENSORS, UNITS, Array
 from benchmarks.hidden_effects.physics.simulation import RATE, Commands
@@ -141,28 +141,6 @@ def draw_case(
     }
     motor, regulator = list(commands.motor), list(commands.regulator)
     return Case([time] * trials, motor, regulator, readings, repeats, truth)
-
-
-def measure(
-    truth: Mapping[str, Any], motor: Array, regulator: Array, first: int, g: np.random.Generator
-) -> list[Array]:
-    """Readings of trials on the rig of a truth, with noise of its kind, shape (rows, 4) each.
-
-    Args:
-        truth: of a case, of which `base`, `effects`, `noise_factors` and `noise_memory` count.
-        motor: (V), shape (trials, rows).
-        regulator: (V), shape (trials, rows).
-        first: how many trials were made before.
-        g: source of the noise.
-    """
-    hidden = {effect["name"]: effect["parameters"] for effect in truth["effects"]}
-    order = first + np.arange(len(motor), dtype=float)
-    clean = simulate_variants(Commands(motor, regulator, order), [(truth["base"], hidden)])[0]
-    levels, colours = (
-        np.array([truth[which][sensor] for sensor in SENSORS])
-        for which in ("noise_factors", "noise_memory")
-    )
-    return [_measured(g, each, levels, colours, hidden) for each in clean]
 
 
 def draw_rig(g: np.random.Generator, most: float) -> tuple[dict[str, float], dict[str, float]]:
@@ -285,7 +263,7 @@ def _measured(
     levels: Array,
     colours: Array,
     parameters: Mapping[str, Values],
-    beside: ReadoutNoise = NONE,
+    beside: ReadoutNoise,
 ) -> Array:
     """One trial's readings in file units: noise, a zero of the LVDT, the DAQ's rounding."""
     white = g.standard_normal(clean.shape)
@@ -319,7 +297,6 @@ class Block:
         ratio: range of r, what an effect changes beyond a refit over the noise.
         trials: of a case.
         seconds: of a trial (s).
-        rounds: experiments that follow on the same rig, where the diagnosis asks for one.
         ugly: what stands in the readings beside noise (`readout_noise`); empty: nothing.
     """
 
@@ -328,7 +305,6 @@ class Block:
     ratio: tuple[float, float] = (0.5, 2.0)
     trials: int = 6
     seconds: float = 8.0
-    rounds: int = 0
     ugly: str = ""
 
     def draw(self, seed: int, number: int) -> Case:
@@ -336,6 +312,19 @@ class Block:
         hidden = (self.turns[(number - 1) % len(self.turns)],) if self.turns else None
         drawn = (self.trials, self.seconds, self.ratio, self.ugly)
         return draw_case(seed, number, self.name, hidden, *drawn)
+
+
+@dataclass(frozen=True)
+class RigsBlock(Block):
+    """Cases of other labs' rigs; of 600 cases 200 hide one effect, 100 two, 200 nothing."""
+
+    def draw(self, seed: int, number: int) -> Case:
+        """Case of a number, 1 and up; the same seed and number give the same bits."""
+        # Here, for no other block needs its simulators.
+        from benchmarks.hidden_effects.rigs.drawing import draw
+
+        texts, truth = draw(seed, number)
+        return Case([], [], [], [], {}, truth, texts)
 
 
 BLOCKS: dict[str, Block] = {
@@ -350,6 +339,7 @@ BLOCKS: dict[str, Block] = {
         *(Block(f"single_{ugly}", tuple(KINDS), ugly=ugly) for ugly in UGLY),
         *(Block(f"nothing_{ugly}", ugly=ugly) for ugly in UGLY),
         Block("slow_drift", ("creep", "leakage", "warm_up"), ugly="drift"),
+        RigsBlock("rigs"),
     )
 }
 """By name, in the order of the table."""

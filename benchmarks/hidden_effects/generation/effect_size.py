@@ -167,9 +167,6 @@ def _interpolated(known: Mapping[float, float], target: float, most: float) -> f
 UNTOLD = 1.0
 """Log-likelihood ratio to expect, up to which data do not tell two truths apart: odds of e."""
 
-SEEN = 12.5
-"""The same, from which on an effect shows beyond doubt: five standard deviations."""
-
 MOST_ODDS = 1e9
 """Largest log-likelihood ratio that is written down."""
 
@@ -199,24 +196,19 @@ class Behind:
         weights += [0.0] * (len(columns) - len(weights))
         self.prior = np.diag(weights)
 
-    def log_odds(self, truth: Array, rival: Array | None = None) -> float:
-        """Half the chi-square that the base, and a rival of free size, cannot absorb of a truth.
+    def log_odds(self, truth: Array) -> float:
+        """Half the chi-square that the base cannot absorb of a truth.
 
         Args:
             truth: readings with what is hidden, shape (trials, rows, 4).
-            rival: readings with the rival at some size; none but the base if not given.
         Returns:
             Infinite where a rig runs away: nothing else does that.
         """
-        if not np.isfinite(truth).all() or (rival is not None and not np.isfinite(rival).all()):
+        if not np.isfinite(truth).all():
             return float("inf")
-        change, columns, prior = self._flat(truth), self.columns, self.prior
-        if rival is not None:
-            columns = np.column_stack([columns, self._flat(rival)])
-            prior = np.pad(prior, (0, 1))
-        matrix = np.vstack([columns, prior])
+        matrix = np.vstack([self.columns, self.prior])
         scale = np.maximum(np.linalg.norm(matrix, axis=0), 1e-12)
-        target = np.concatenate([change, np.zeros(len(prior))])
+        target = np.concatenate([self._flat(truth), np.zeros(len(self.prior))])
         moves = np.linalg.lstsq(matrix / scale, target, rcond=1e-9)[0]
         return 0.5 * float(np.sum((target - matrix / scale @ moves) ** 2))
 

@@ -3,20 +3,12 @@
 import json
 import re
 import shutil
-import tomllib
-from functools import cache
 from pathlib import Path
-
-import numpy as np
 
 import pma_gym
 from benchmarks.hidden_effects.generation.cases import Case
-from benchmarks.hidden_effects.physics.rig import Array
-from benchmarks.hidden_effects.physics.simulation import RATE
-from pma_gym.discovery.experiments.excitation import RATE_HZ, Excitation, library
 from pma_gym.files import replace_file
 from pma_gym.partials import begin_partial, end_partial
-from pma_gym.plant.model import parse_model
 
 HEADER = (
     "time_s,motor_voltage_v,regulator_voltage_v,contraction_mm,rotation_deg,load_n,pressure_kpa"
@@ -83,44 +75,3 @@ def _dataset(case: Case) -> str:
         if i in case.repeat_of:
             lines.append(f'repeat_of = "{trial_name(case.repeat_of[i])}"')
     return "\n".join(lines) + "\n"
-
-
-Volts = tuple[Array, Array]
-"""Motor and regulator voltages at `RATE`, shape (rows,) each."""
-
-
-@cache
-def safe_experiments() -> tuple[Excitation, ...]:
-    """The whole library, as large as is safe by what the lab believes."""
-    assert RATE_HZ == RATE, "the library and the generator count rows alike"
-    return tuple(library([parse_model(tomllib.loads(lab_model()))]))
-
-
-def named(prefix: str, g: np.random.Generator) -> tuple[str, Volts]:
-    """Name and volts of an excitation whose name begins with words, at one of its settings.
-
-    Raises:
-        ValueError: there is none.
-    """
-    experiments = [each for each in safe_experiments() if each.name.startswith(prefix)]
-    if not experiments:
-        raise ValueError(f"the library has no excitation that begins with {prefix!r}")
-    chosen = experiments[int(g.integers(len(experiments)))]
-    return chosen.name, volts(chosen)
-
-
-def random_experiment(g: np.random.Generator, rows: int) -> tuple[str, Volts]:
-    """A random excitation, cut or repeated so that it takes as many rows as another."""
-    every = safe_experiments()
-    chosen = every[int(g.integers(len(every)))]
-    motor, regulator = (np.resize(column, rows) for column in volts(chosen))
-    return chosen.name, (motor, regulator)
-
-
-def volts(excitation: Excitation) -> Volts:
-    """Its commands, in whole millivolts as a lab sends them."""
-    commands = excitation.trial.commands
-    return (
-        np.round(commands["motor_voltage"], 3),
-        np.round(commands["regulator_voltage"], 3),
-    )

@@ -35,19 +35,10 @@ class Offer:
     fits: Callable[[AnyRig], bool] = lambda rig: True
 
 
-def _free(rig: AnyRig) -> bool:
-    return not rig.stiffness and not rig.gravity
-
-
 def _coulomb(rng: np.random.Generator, rig: AnyRig) -> HiddenEffect:
     rise = rng.uniform(0.1, 0.5) if rng.random() < 0.5 else 0.0
     stribeck = rig.peak_speed * rng.uniform(0.02, 0.1)
     return laws.CoulombFriction(0.5 * rig.peak_force / (1.0 + rise), rise, stribeck)
-
-
-def _by_position(rng: np.random.Generator, rig: AnyRig) -> HiddenEffect:
-    slope = rng.choice((-1.0, 1.0)) * rng.uniform(0.4, 0.8) / rig.travel
-    return laws.PositionFriction(0.3 * rig.peak_force, float(slope))
 
 
 def _by_pressure(rng: np.random.Generator, rig: AnyRig) -> HiddenEffect:
@@ -75,10 +66,11 @@ OFFERS: dict[str, Offer] = {
     "pressure_dependent_friction": Offer(
         _by_pressure, lambda rig: isinstance(rig, ImposedRig) and rig.area > 0.0
     ),
-    "position_dependent_friction": Offer(_by_position),
-    "constant_force": Offer(lambda rng, rig: laws.ConstantForce(0.5 * rig.peak_force)),
     "gravity": Offer(_gravity, lambda rig: rig.kind == "joint" and not rig.gravity),
-    "spring": Offer(lambda rng, rig: laws.Spring(0.6 * rig.peak_force / rig.travel), _free),
+    "spring": Offer(
+        lambda rng, rig: laws.Spring(0.6 * rig.peak_force / rig.travel),
+        lambda rig: not rig.stiffness and not rig.gravity,
+    ),
     "hardening_spring": Offer(
         lambda rng, rig: laws.HardeningSpring(0.6 * rig.peak_force / rig.travel**3)
     ),
@@ -92,8 +84,6 @@ OFFERS: dict[str, Offer] = {
     "directional_gain": Offer(lambda rng, rig: laws.DirectionalGain(0.2)),
     "drive_delay": Offer(lambda rng, rig: laws.DriveDelay(_late(rig))),
     "drive_lag": Offer(lambda rng, rig: laws.DriveLag(_late(rig))),
-    "channel_delay": Offer(lambda rng, rig: laws.ChannelDelay(_late(rig))),
-    "backlash": Offer(lambda rng, rig: laws.Backlash(0.2 * rig.travel)),
 }
 """By the catalogue's name."""
 

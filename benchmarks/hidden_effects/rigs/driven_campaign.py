@@ -18,7 +18,7 @@ from benchmarks.hidden_effects.rigs.rig import (
     draw_reference,
     draw_slide,
 )
-from benchmarks.hidden_effects.rigs.sensing import Sensed, Sensor, draw_sensor
+from benchmarks.hidden_effects.rigs.sensing import Sensor, draw_sensor
 from benchmarks.hidden_effects.rigs.simulators import mujoco_axis, stick_slip
 from benchmarks.hidden_effects.rigs.simulators.drive import Transmission
 from benchmarks.hidden_effects.rigs.simulators.stick_slip import Motion
@@ -37,14 +37,16 @@ class Controller:
     Attributes:
         believed: the rig as the lab's model has it.
         reference: to follow.
-        sensed: its sensor.
+        sensor: of the position.
+        noise: of its every reading, shape (rows,).
         bandwidth: of the closed loop (Hz); 0 leaves it open.
         released: the loop closes at the end of the rest; else it holds the axis there too.
     """
 
     believed: Rig
     reference: Reference
-    sensed: Sensed
+    sensor: Sensor
+    noise: np.ndarray
     bandwidth: float
     released: bool
 
@@ -59,15 +61,15 @@ class Controller:
     def __call__(self, row: int, q: float) -> float:
         """Command of a row; q is the position in the row before it."""
         if row:
-            self.readings.append(self.sensed.read(q))
+            self.read(q)
         force = self._forward(row)
         if self.bandwidth and row >= self._closed_from:
             force += self._feedback(row)
         return self.step * round(min(max(force, -self.limit), self.limit) / self.step)
 
-    def end(self, q: float) -> None:
-        """The reading of the last row."""
-        self.readings.append(self.sensed.read(q))
+    def read(self, q: float) -> None:
+        """The next row's reading."""
+        self.readings.append(self.sensor.reading(q, self.noise[len(self.readings)]))
 
     def _forward(self, row: int) -> float:
         rig, to = self.believed, self.reference
@@ -77,7 +79,7 @@ class Controller:
     def _feedback(self, row: int) -> float:
         """Position and filtered speed; the reading is a row old."""
         omega, inertia = 2.0 * math.pi * self.bandwidth, self.believed.inertia
-        interval = self.sensed.interval
+        interval = 1.0 / self.believed.rate
         error = self.reference.q[row - 1] - self.readings[-1]
         if len(self.readings) > 1:
             new = (self.readings[-1] - self.readings[-2]) / interval
@@ -104,21 +106,6 @@ COLUMNS = {
 
 
 @dataclass(frozen=True)
-class Run:
-    """One file: the true motion and what was logged.
-
-    Attributes:
-        motion: the true one, with the command.
-        exact: what the sensor would read without noise (m, rad).
-        readings: of the sensor.
-    """
-
-    motion: Motion
-    exact: np.ndarray
-    readings: np.ndarray
-
-
-@dataclass(frozen=True)
 class DrivenCampaign:
     """One rig and its files.
 
@@ -142,15 +129,15 @@ class DrivenCampaign:
     simulator: str
     seed: Sequence[int]
 
-    def run(self, effects: Sequence[HiddenEffect], i: int, seconds: float = math.inf) -> Run:
-        """File i, or its first seconds."""
+    def run(
+        self, effects: Sequence[HiddenEffect], i: int, seconds: float = math.inf
+    ) -> tuple[Motion, np.ndarray]:
+        """True motion and the sensor's readings (m, rad) of file i, or of its first seconds."""
         rig, reference = self.rig, self.references[i]
         rows = int(min(len(reference.q), seconds * rig.rate))
-        noise = self._noise(i)
-        between = [r for r in (each.reading() for each in effects) if r is not None]
-        sensed = Sensed(self.sensor, noise, between, 1.0 / rig.rate)
+        sensing = self.sensor, self._noise(i)
         rests = self._rests(effects)
-        controller = Controller(self.believed, reference, sensed, self.bandwidth, rests)
+        controller = Controller(self.believed, reference, *sensing, self.bandwidth, rests)
         transmission = Transmission()
         for each in effects:
             transmission = each.transmission(transmission)
@@ -165,21 +152,20 @@ class DrivenCampaign:
             motion = mujoco_axis.simulate(*moved, step)
         else:
             motion = stick_slip.simulate(*moved)
-        controller.end(float(motion.q[-1]))
-        return Run(motion, np.array(sensed.exact), np.array(controller.readings))
+        controller.read(float(motion.q[-1]))
+        return motion, np.array(controller.readings)
 
     def ratio(self, effect: HiddenEffect) -> float:
         """Size r of an effect, by the beginning of the first file."""
-        pilot = self.run((effect,), 0, PILOT + 2.0 / self.rig.frequency)
-        changed = effect_size.change(self.rig, [pilot.motion], [pilot.exact])
-        return effect_size.size(changed, self.sensor.rms)
+        pilot, _ = self.run((effect,), 0, PILOT + 2.0 / self.rig.frequency)
+        return effect_size.size(effect_size.change(self.rig, pilot), self.sensor.rms)
 
     def within_range(self, effects: Sequence[HiddenEffect]) -> "DrivenCampaign":
         """The same, with its loop closed where it would lead away without."""
         if self.bandwidth:
             return self
-        files_run = (self.run(effects, i) for i in range(len(self.references)))
-        far = max(float(np.abs(each.motion.q).max()) for each in files_run)
+        motions = (self.run(effects, i)[0] for i in range(len(self.references)))
+        far = max(float(np.abs(each.q).max()) for each in motions)
         if far <= FARTHEST * self.rig.travel:
             return self
         return replace(self, bandwidth=2.0 * self.rig.frequency, repeats={})
@@ -190,13 +176,13 @@ class DrivenCampaign:
         sign = -1.0 if self.rig.kind == "slide" else 1.0
         tables, limit = [], 0.0
         for i in range(len(self.references)):
-            run = self.run(effects, i)
-            forces = sign * run.motion.command
+            motion, readings = self.run(effects, i)
+            forces = sign * motion.command
             limit = max(limit, float(np.abs(forces).max()))
             tables.append(
                 {
                     command: (forces, files.digits(2.0 * limit / 2**16)),
-                    position: (factor * run.readings, files.digits(factor * self.sensor.step)),
+                    position: (factor * readings, files.digits(factor * self.sensor.step)),
                 }
             )
         model = files.MODELS[self.rig.kind](self.believed, limit)

@@ -8,12 +8,12 @@ Along the true motion the lab's model lacks a force d(t). To first order its pos
 
 which begins anew in each window, for the model may start where it likes there. What changes of
 inertia, damping, stiffness and gravity, and of the start of each window, do the same way is taken
-off by least squares; what is left is the change. A sensor's error is added to e as it is.
-Windows last a second, or the slowest period of the reference where that is longer.
+off by least squares; what is left is the change. Windows last a second, or the slowest period of
+the reference where that is longer.
 """
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
@@ -88,17 +88,16 @@ SLOWEST = 0.2
 """Slowest part of a reference over the fastest."""
 
 
-def change(rig: Rig, motions: Sequence[Motion], exact: Sequence[Array]) -> Array:
+def change(rig: Rig, motion: Motion) -> Array:
     """What the effect changes beyond a refit (m, rad), rows of all windows in turn.
 
     Args:
         rig: the axis without what it hides.
-        motions: of the axis with it, one a file.
-        exact: what the sensor would read without noise, one a file.
+        motion: of the axis with it.
     """
     rows = round(rig.rate * max(WINDOW, 1.0 / (SLOWEST * rig.frequency)))
-    parts = [_windows(rig, m, e, rows) for m, e in zip(motions, exact, strict=True)]
-    columns = np.concatenate([part for part in parts if part is not None], axis=1)
+    rows = min(rows, len(motion.q))
+    columns = _responses(rig, motion, rows, len(motion.q) // rows)
     # (regressors, windows, rows): each window gives up its own starts first.
     effect, known, starts = columns[0], columns[1:-2], columns[-2:]
     basis = np.linalg.qr(starts.transpose(1, 2, 0))[0]
@@ -121,16 +120,8 @@ def _without(basis: Array, signals: Array) -> Array:
     return signals - np.einsum("wrk,...wk->...wr", basis, shares)
 
 
-def _windows(rig: Rig, motion: Motion, exact: Array, rows: int) -> Array | None:
-    """Responses of one file, shape (regressors, windows, rows)."""
-    count = len(motion.q) // rows
-    if not count:
-        rows, count = len(motion.q), 1
-        return None if rows < 10 else _responses(rig, motion, exact, rows, count)
-    return _responses(rig, motion, exact, rows, count)
-
-
-def _responses(rig: Rig, motion: Motion, exact: Array, rows: int, count: int) -> Array:
+def _responses(rig: Rig, motion: Motion, rows: int, count: int) -> Array:
+    """Shape (regressors, windows, rows)."""
     q, v, a = motion.q, motion.v, motion.a
     weight = rig.gravity * np.sin(q + rig.gravity_angle)
     lacking = rig.inertia * a + rig.damping * v + rig.stiffness * q + weight - motion.command
@@ -144,9 +135,7 @@ def _responses(rig: Rig, motion: Motion, exact: Array, rows: int, count: int) ->
     shaped = np.array(forces)[:, : count * rows].reshape(len(forces), count, rows)
     stiffness = rig.stiffness + rig.gravity * np.cos(q + rig.gravity_angle)
     stiffness = stiffness[: count * rows].reshape(count, rows)
-    response = _integrated(rig, shaped, stiffness)
-    response[0] += (exact - q)[: count * rows].reshape(count, rows)
-    return response
+    return _integrated(rig, shaped, stiffness)
 
 
 def _integrated(rig: Rig, forces: Array, stiffness: Array) -> Array:

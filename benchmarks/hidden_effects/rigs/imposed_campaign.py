@@ -8,7 +8,7 @@ import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
 from benchmarks.hidden_effects.rigs import files
-from benchmarks.hidden_effects.rigs.laws import Backlash, HiddenEffect
+from benchmarks.hidden_effects.rigs.laws import HiddenEffect
 from benchmarks.hidden_effects.rigs.rig import (
     ImposedRig,
     Reference,
@@ -58,9 +58,7 @@ class ImposedCampaign:
 
     def force(self, effects: Sequence[HiddenEffect], i: int) -> np.ndarray:
         """Of file i without noise (N), shape (rows,)."""
-        # What MuJoCo's inverse dynamics has no part for is computed by the other.
-        own = any(isinstance(each, Backlash) for each in effects)
-        simulate = SIMULATORS["own" if own else self.simulator]
+        simulate = SIMULATORS[self.simulator]
         return simulate(self.rig, tuple(effects), self.motions[i], self.rig.pressures[i])
 
     def ratio(self, effect: HiddenEffect) -> float:

@@ -37,10 +37,6 @@ class HiddenEffect:
         """What it makes of the drive."""
         return drive
 
-    def reading(self) -> "SensorLink | None":
-        """What it makes of the position sensor, None if nothing."""
-        return None
-
     def scaled(self, factor: float) -> Self:
         """The same, larger by a factor."""
         return replace(self, size=self.size * factor)
@@ -48,19 +44,6 @@ class HiddenEffect:
     def values(self) -> dict[str, float]:
         """Its parameters in SI."""
         return {key: value for key, value in vars(self).items() if isinstance(value, float)}
-
-
-@dataclass(frozen=True)
-class SensorLink:
-    """Link between the axis and its position sensor.
-
-    Attributes:
-        delay: readings come so much later (s).
-        play: width of a backlash between axis and sensor (m, rad).
-    """
-
-    delay: float = 0.0
-    play: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -98,27 +81,6 @@ class PressureFriction(HiddenEffect):
     def kinetic(self, q: float, v: float, u: float) -> float:  # noqa: D102
         # An imposed motion has a pressure where a driven one has the force of its drive.
         return self.size * (1.0 + self.slope * u)
-
-
-@dataclass(frozen=True)
-class PositionFriction(HiddenEffect):
-    """Dry friction `size` at q = 0 that changes by `slope` of itself a unit of travel."""
-
-    slope: float = 0.0
-    name: ClassVar[str] = "position_dependent_friction"
-
-    def kinetic(self, q: float, v: float, u: float) -> float:  # noqa: D102
-        return self.size * max(0.0, 1.0 + self.slope * q)
-
-
-@dataclass(frozen=True)
-class ConstantForce(HiddenEffect):
-    """A force that is always there: a tilted slide, a counterweight."""
-
-    name: ClassVar[str] = "constant_force"
-
-    def force(self, q: float, v: float, u: float) -> float:  # noqa: D102
-        return self.size
 
 
 @dataclass(frozen=True)
@@ -213,26 +175,6 @@ class DriveLag(HiddenEffect):
 
     def transmission(self, drive: Transmission) -> Transmission:  # noqa: D102
         return replace(drive, lag=self.size)
-
-
-@dataclass(frozen=True)
-class ChannelDelay(HiddenEffect):
-    """Two loggers: positions are `size` seconds older than commands."""
-
-    name: ClassVar[str] = "channel_delay"
-
-    def reading(self) -> SensorLink:  # noqa: D102
-        return SensorLink(delay=self.size)
-
-
-@dataclass(frozen=True)
-class Backlash(HiddenEffect):
-    """Play of width `size` between axis and position sensor."""
-
-    name: ClassVar[str] = "backlash"
-
-    def reading(self) -> SensorLink:  # noqa: D102
-        return SensorLink(play=self.size)
 
 
 @dataclass(frozen=True)

@@ -1,13 +1,11 @@
-"""A position sensor: play, delay, noise and the step that it rounds to."""
+"""A position sensor: noise and the step that it rounds to."""
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.signal import lfilter
 
-from benchmarks.hidden_effects.rigs.laws import SensorLink
 from benchmarks.hidden_effects.rigs.rig import Rig, log_uniform
 
 Array = np.ndarray
@@ -123,41 +121,9 @@ class Sensor:
         """Of noise and rounding (m, rad)."""
         return float(np.hypot(self.noise.rms, self.step / np.sqrt(12.0)))
 
-
-@dataclass
-class Sensed:
-    """One sensor in one file: readings row by row.
-
-    Attributes:
-        sensor: which.
-        noise: of every row, shape (rows,).
-        between: axis and sensor, in the order in which they act.
-        interval: between rows (s).
-    """
-
-    sensor: Sensor
-    noise: Array
-    between: Sequence[SensorLink]
-    interval: float
-    exact: list[float] = field(default_factory=list)
-    _past: list[float] = field(default_factory=list)
-
-    def read(self, q: float) -> float:
-        """The next row's reading of a position."""
-        row = len(self.exact)
-        play, delay = (sum(getattr(r, key) for r in self.between) for key in ("play", "delay"))
-        if row and play:
-            q = min(max(self._past[-1], q - 0.5 * play), q + 0.5 * play)
-        self._past.append(q)
-        place = max(row - delay / self.interval, 0.0)
-        first = int(place)
-        part = place - first
-        seen = self._past[first]
-        if part:
-            seen += part * (self._past[first + 1] - seen)
-        self.exact.append(seen)
-        step = self.sensor.step
-        return step * round((seen + self.noise[row]) / step)
+    def reading(self, q: float, noise: float) -> float:
+        """What it shows at a position (m, rad), with so much noise."""
+        return self.step * round((q + noise) / self.step)
 
 
 def draw_sensor(rng: np.random.Generator, rig: Rig) -> Sensor:

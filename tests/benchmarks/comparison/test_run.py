@@ -1,13 +1,10 @@
 """A run loses nothing: killed or interrupted it goes on, and ends with the same bits."""
 
-import csv
 import io
 import json
 import os
-import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +13,6 @@ from rich.console import Console
 from typer.testing import CliRunner
 
 from benchmarks.__main__ import app
-from benchmarks.comparison.add import SCORES, TIMES
 from benchmarks.comparison.compare import compare
 from benchmarks.comparison.job import chosen, run_comparison
 from benchmarks.executors.executor import ProcessDied, ThisProcess
@@ -55,13 +51,11 @@ title = "PID"
 """
 
 MINE = """
-import time
 class {name}:
     name = "mine"
     def reset(self, reference, station):
         self.reference, self.volts = reference, 0.0
     def act(self, observation, now):
-        time.sleep({sleep})
         self.volts += 20.0 * (self.reference(now) - observation.extension)
         return min(max(self.volts, 0.0), 10.0)
 """
@@ -74,9 +68,9 @@ def suite(tmp_path):
     return frozen_suite(str(path))
 
 
-def own(folder, name, sleep=0.0):
+def own(folder, name):
     path = folder / f"{name}.py"
-    path.write_text(MINE.format(name=name, sleep=sleep))
+    path.write_text(MINE.format(name=name))
     return f"{path}:{name}"
 
 
@@ -85,59 +79,6 @@ def run(suite, controllers, out, executor=ONE):
     entries = chosen(suite, controllers)
     code = run_comparison(suite, entries, out, executor, Console(file=words, width=200))
     return code, words.getvalue()
-
-
-def table(out):
-    rows = csv.DictReader((out / SCORES).read_text().splitlines())
-    return [{name: value for name, value in row.items() if name not in TIMES} for row in rows]
-
-
-@pytest.mark.campaign
-def test_a_run_that_is_interrupted_and_killed_ends_as_if_it_had_not_been(suite, tmp_path):
-    slow = own(tmp_path, "Slow", sleep=0.0004)
-    out = tmp_path / "out"
-    command = [sys.executable, "-m", "benchmarks", "run", "--suite", suite.source]
-    command += ["--controllers", f"pid,{slow}", "--out", str(out)]
-    # Of any number of processes, the bits are the same.
-    interrupted, done = _stop([*command, "--jobs", "2"], out, 2, signal.SIGINT)
-    assert interrupted.returncode == 130, interrupted.stderr
-    assert f"Interrupted: {done} of 12 cases are done and stay in" in interrupted.stdout
-    assert "The same command goes on from there." in interrupted.stdout
-    killed, after = _stop([*command, "--jobs", "1"], out, done + 2, signal.SIGKILL)
-    assert killed.returncode == -signal.SIGKILL and after < 12
-    assert not (out / SCORES).exists()
-    with (out / JOURNAL).open("ab") as journal:
-        journal.write(b'{"suite": "small", "versi')
-    before = sum(1 for _ in case_rows(out / JOURNAL))
-    code, words = run(suite, f"pid,{slow}", out)
-    assert code == 0 and f"{before} cases are done" in words
-    # No case ran twice.
-    assert sum(1 for _ in case_rows(out / JOURNAL)) == 12
-    whole = tmp_path / "whole"
-    assert run(suite, f"pid,{slow}", whole)[0] == 0
-    assert len(table(out)) == 12 and table(out) == table(whole)
-    assert read_run(out)["complete"] and len(finished_rows(out)) == 12
-
-
-def _stop(command, out, rows, how):
-    """Run a command until its journal has so many rows, and stop it; how many there are then."""
-    with subprocess.Popen(
-        command,
-        cwd=ROOT,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        env=os.environ | {"COLUMNS": "300"},
-        # A test run in the background ignores Ctrl-C, and its children would inherit that.
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
-    ) as process:
-        deadline = time.monotonic() + 60
-        while sum(1 for _ in case_rows(out / JOURNAL)) < rows and time.monotonic() < deadline:
-            time.sleep(0.02)
-        process.send_signal(how)
-        output, errors = process.communicate(timeout=60)
-    done = subprocess.CompletedProcess(command, process.returncode, output, errors)
-    return done, sum(1 for _ in case_rows(out / JOURNAL))
 
 
 def test_a_line_torn_by_a_crash_costs_its_case_alone(tmp_path):
@@ -158,7 +99,7 @@ def test_only_what_was_made_with_the_same_is_used_again(suite, tmp_path, monkeyp
     assert run(suite, f"pid,{mine}", out)[0] == 0
     entries = chosen(suite, f"pid,{mine}")
     assert not pending_cases(suite, entries, out).missing
-    (tmp_path / "Mine.py").write_text(MINE.format(name="Mine", sleep=0.0) + "# another\n")
+    (tmp_path / "Mine.py").write_text(MINE.format(name="Mine") + "# another\n")
     changed = pending_cases(suite, entries, out)
     assert {case.spec.name for case in changed.missing} == {"Mine"}
     assert (len(changed.known), changed.outdated) == (6, 6)
@@ -206,12 +147,12 @@ def test_a_later_run_adds_controllers_to_the_same_folder(suite, tmp_path):
 
 def test_what_fails_is_a_row_with_its_reason(suite, tmp_path):
     path = tmp_path / "fails.py"
-    path.write_text(MINE.format(name="Fails", sleep=0.0).replace("self.volts +=", "1 / 0 #"))
+    path.write_text(MINE.format(name="Fails").replace("self.volts +=", "1 / 0 #"))
     code, words = run(suite, f"{path}:Fails", tmp_path / "out")
     assert code == 1
     rows = list(case_rows(tmp_path / "out" / JOURNAL))
     assert len(rows) == 6 and len({row["failure"] for row in rows}) == 1
-    reason = "act raised ZeroDivisionError: division by zero (line 9 of fails.py, at 0 s)"
+    reason = "act raised ZeroDivisionError: division by zero (line 7 of fails.py, at 0 s)"
     assert rows[0]["failure"] == f"ControllerError: {reason}"
     assert f"Fails/-1/displacement/200/0 and 5 more: {reason}" in words
 

@@ -9,7 +9,7 @@ import pytest
 
 from benchmarks.hidden_effects import physics
 from benchmarks.hidden_effects.evaluation import scoring
-from benchmarks.hidden_effects.evaluation.verdicts import compare, judged
+from benchmarks.hidden_effects.evaluation.verdicts import compare
 from benchmarks.hidden_effects.generation import files
 from benchmarks.hidden_effects.generation.cases import BLOCKS, Block, draw_case
 from benchmarks.hidden_effects.generation.effect_size import simulate_variants
@@ -307,7 +307,7 @@ def test_answers_are_counted(drawn):
     assert single["confidently wrong"]["hits"] == 0
     assert document["blocks"]["nothing"]["rates"]["false alarm"]["rate"] == 1.0
     assert document["blocks"]["single"]["gap_closed"]["median"]["value"] == pytest.approx(0.9444)
-    assert document["blocks"]["single"]["confusion"] == {"drive_dead_zone": {"cable_slack": 2}}
+    assert [each["said"] for each in document["blocks"]["single"]["misses"]] == ["cable_slack"] * 2
     assert not document["blocks"]["single"]["unanswered"]
 
 
@@ -330,18 +330,6 @@ def test_an_answer_is_compared_with_its_truth():
     assert outcome("parameters", [], "parameters").parameters is False
 
 
-def test_what_follows_settles_only_by_the_truth_or_its_group_alone():
-    for said, settled, wrong in (
-        ("creep", True, False),
-        ("slow_creep", True, False),
-        ("filling", False, True),
-        ("creep + filling", False, True),
-        ("undecidable", False, False),
-        ("no answer", False, False),
-    ):
-        assert judged(said, ["creep"]) == {"settled": settled, "wrong": wrong}
-
-
 def test_a_parameter_that_was_missed_is_told_with_what_was_named_instead():
     factors = {"mass": 1.2, "radius": 0.8}
     truth = {"block": "parameters", "effects": [], "base_factors": factors, "number": 3}
@@ -353,9 +341,6 @@ def test_a_parameter_that_was_missed_is_told_with_what_was_named_instead():
     assert missed.parameters is False and missed.missing == ("mass",)
     assert missed.beyond == ("cable.stiffness_n_per_mm",)
     block = scoring.count([missed])["blocks"]["parameters"]
-    by = block["by_parameter_off"]
-    assert by["radius"]["named"]["hits"] == 1 and by["mass"]["named"]["hits"] == 0
-    assert by["mass"]["instead"] == {"cable.stiffness_n_per_mm": 1}
     (miss,) = block["misses"]
     assert miss["said"].endswith("cable.stiffness_n_per_mm; without mass")
 

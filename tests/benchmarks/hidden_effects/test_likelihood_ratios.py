@@ -18,10 +18,10 @@ from benchmarks.hidden_effects.physics.simulation import Commands
 from tests.benchmarks.hidden_effects.cheap_diagnosis import document
 
 
-def test_what_parameters_and_rivals_absorb_is_not_told():
+def test_what_parameters_absorb_is_not_told():
     numbers = {"radius": 1.0, "mass": 2.0}
     g = np.random.default_rng(1)
-    base, *shapes = 100.0 * g.standard_normal((5, 2, 40, 4))
+    base, *shapes = 100.0 * g.standard_normal((4, 2, 40, 4))
     few = Commands(np.zeros((2, 40)), np.zeros((2, 40)), np.arange(2.0))
     behind = Behind(
         Experiment(few, np.ones((2, 40), bool), np.ones(4)),
@@ -32,10 +32,7 @@ def test_what_parameters_and_rivals_absorb_is_not_told():
     small, large = (behind.log_odds(base + size * KNOWN * shapes[0]) for size in (1.0, 5.0))
     # Half the square of how many standard deviations the radius must be off.
     assert small == pytest.approx(0.5, rel=0.02) and large == pytest.approx(12.5, rel=0.02)
-    alone = behind.log_odds(base + shapes[2])
-    assert alone > 100.0
-    assert behind.log_odds(base + shapes[2], base + 3.0 * shapes[2]) < 1e-9
-    assert behind.log_odds(base + shapes[2], base + shapes[3]) > 0.5 * alone
+    assert behind.log_odds(base + shapes[2]) > 100.0
 
 
 def off(**factors):
@@ -45,13 +42,6 @@ def off(**factors):
     experiment = Experiment(commands, np.ones(motor[None].shape, bool), noise_levels(np.ones(4)))
     rig = {name: value * factors.get(name, 1.0) for name, value in NOMINAL.items()}
     return odds_of_parameters(experiment, rig, factors, SCALED_TOGETHER)
-
-
-def test_odds_of_a_parameter_grow_with_the_square_of_what_it_is_off_by():
-    small, large = off(radius=1.004)["radius"], off(radius=1.008)["radius"]
-    assert small > UNTOLD and large == pytest.approx(4.0 * small, rel=0.1)
-    both = off(radius=1.004, mass=1.2)
-    assert set(both) == {"radius", "mass"} and both["radius"] == pytest.approx(small, rel=0.1)
 
 
 def test_a_light_slide_is_not_told_beside_a_rotor_and_a_radius_is():

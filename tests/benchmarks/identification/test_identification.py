@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from benchmarks.identification import statics, transients
-from benchmarks.identification.creep import STUDENT_10
-from benchmarks.identification.identify import borne, borne_unit
+from benchmarks.identification.identify import STUDENT_10, borne, borne_unit
 from benchmarks.identification.statics import station_limits
 from benchmarks.identification.station import fitted_parameters, identify, leave_out
 from pma_gym.plant.model import load_model

@@ -1,33 +1,20 @@
-"""The dissertation's tables as trials and their diagnosis in rounds."""
+"""The dissertation's tables as trials, and what is made of their diagnosis."""
 
-from io import StringIO
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from rich.console import Console
-from typer.testing import CliRunner
 
-from benchmarks.__main__ import app
 from benchmarks.measured import diagnose_tables
-from benchmarks.measured import rounds as of_rounds
 from benchmarks.measured.diagnose_tables import (
     DIAGNOSED_KPA,
     UNSEEN_KPA,
-    Measured,
+    added_by,
     diagnosed,
+    run_measured,
     write_trials,
 )
-from benchmarks.measured.held_out import (
-    limit_errors,
-    repeat_scatter,
-    rms,
-    worked,
-)
-from benchmarks.measured.pages import measured_page, print_measured
-from benchmarks.measured.rounds import Round, Stages, rounds
-from benchmarks.measured.steps import Step
-from benchmarks.measured.tables import COLUMNS
+from benchmarks.measured.held_out import Rig, limit_errors, repeat_scatter, rms, worked
 from benchmarks.measured.trials import measured_dataset
 from pma_gym.data.datasets.dataset import read_dataset
 from pma_gym.data.files.trial_files import TrialWarning
@@ -98,111 +85,13 @@ def test_written_trials_are_read_again(tmp_path):
     assert one.trial.measurements["contraction"] == pytest.approx(ours, nan_ok=True)
 
 
-def candidate(name, why=ADDED):
-    return SimpleNamespace(name=name, why=why, p_value=0.001, delta_log_likelihood=9.0)
-
-
-def answer(model, effect=None, verdict="effect"):
-    return SimpleNamespace(
-        verdict=verdict,
-        sentence="",
-        effects=[],
-        candidates=[candidate("creep", "chance")] + ([candidate(effect)] if effect else []),
-        not_detectable=("creep",),
-        next_experiment=None,
-        gap={},
-        seconds={},
-        model=model,
-    )
-
-
-@pytest.fixture
-def asked(monkeypatch):
-    """Diagnoses of which the first finds slack, the second nothing; and who asked with what."""
-    models = []
-
-    def diagnose(data, model, **_):
-        models.append(model)
-        if model.parameters["cable"].slack == 0.0:
-            return answer(model.replace({"cable.slack_mm": 1.0}), "cable_slack")
-        return answer(model, verdict="agrees")
-
-    monkeypatch.setattr(of_rounds, "diagnose", diagnose)
-    return models
-
-
-def diagnose_small(folder, code="this", recompute=False):
-    """Rounds of a few trials, by some code; and what it took."""
-
-    def silent(*_):
-        """No progress."""
-
-    data = measured_dataset((150.0,), (75.0,), steps=0)
-    stages = Stages(folder, recompute, code)
-    messages = stages.others()
-    return (
-        *rounds((data,), load_model("serres2008"), stages, 0, 1, lambda _: silent),
-        stages,
-        messages,
-    )
-
-
-def test_each_round_begins_with_what_the_one_before_amended(tmp_path, asked):
-    rounds, model, _, messages = diagnose_small(tmp_path)
-    assert [each.effects for each in rounds] == [("cable_slack",), ()]
-    assert model.parameters["cable"].slack == pytest.approx(1e-3)
-    assert len(asked) == 2 and not messages
-    again, same, stages, messages = diagnose_small(tmp_path)
-    assert len(asked) == 2, "a finished round is not asked again"
-    assert (again[0].effects, again[1].verdict) == (["cable_slack"], "agrees")
-    assert same.parameters == model.parameters
-    assert stages.codes == {"this": 2} and not messages
-
-
-def test_rounds_of_other_code_are_told_and_used_unless_made_anew(tmp_path, asked):
-    diagnose_small(tmp_path, "older")
-    *_, stages, messages = diagnose_small(tmp_path, "newer")
-    assert len(asked) == 2 and stages.codes == {"older": 2}
-    assert messages == (
-        f"2 of 2 stages kept in {tmp_path} are by other code than this "
-        "(--recompute makes those anew)"
-    )
-    *_, stages, messages = diagnose_small(tmp_path, "newer", recompute=True)
-    assert len(asked) == 4 and stages.codes == {"newer": 2} and not messages
-    *_, stages, messages = diagnose_small(tmp_path, "newer", recompute=True)
-    assert len(asked) == 4 and stages.codes == {"newer": 2}, "an interrupted --recompute goes on"
-
-
-def test_a_stage_answers_its_own_question_and_has_what_it_needs(tmp_path):
-    stages = Stages(tmp_path, code="this")
-    stages.keep("step_1", "question", {"fitted": 1.5})
-
-    def made(fitted):
-        return fitted
-
-    def made_otherwise(fitted, judged):
-        """A stage of which other code keeps more."""
-
-    assert stages.kept("step_1", "question", made) == 1.5
-    assert stages.kept("step_1", "another", made) is None
-    assert stages.kept("step_2", "question", made) is None
-    assert stages.kept("step_1", "question", made_otherwise) is None
-
-
-def test_fits_of_other_code_do_not_go_into_a_diagnosis(tmp_path):
-    older, newer = Stages(tmp_path, code="older"), Stages(tmp_path, code="newer")
-    assert older.journal != newer.journal
-
-
-def test_the_command_says_what_is_to_be_made_anew(tmp_path, monkeypatch):
-    orders = []
-    monkeypatch.setattr(
-        diagnose_tables, "run_measured", lambda *_, recompute: orders.append(recompute)
-    )
-    for options in ([], ["--recompute"]):
-        done = CliRunner().invoke(app, ["measured", "--out", str(tmp_path), *options])
-        assert done.exit_code == 0, done.output
-    assert orders == [False, True]
+@pytest.mark.parametrize(
+    ("verdict", "added"), [("effect", ["creep"]), ("unknown", ["creep"]), ("undecidable", [])]
+)
+def test_what_a_diagnosis_added_counts_unless_it_cannot_decide(verdict, added):
+    candidates = [SimpleNamespace(name=n, why=w) for n, w in (("creep", ADDED), ("filling", ""))]
+    diagnosis = SimpleNamespace(verdict=verdict, candidates=candidates)
+    assert added_by(diagnosis) == added
 
 
 def test_a_worked_muscle_has_no_warmth_left():
@@ -212,33 +101,22 @@ def test_a_worked_muscle_has_no_warmth_left():
     assert worked(load_model("station")).parameters == load_model("station").parameters
 
 
-def step(name, effects, error):
-    figures = {key: error for key, _ in COLUMNS}
-    phases = [
-        {"phase": phase, "slope": 0.1, "intercept": 0.2, "mean": error, "mean_signed": -error,
-         "rmse": 0.3, "trials": 9}
-        for phase in ("displacement", "I", "II", "III")
-    ]  # fmt: skip
-    return Step(name, effects, figures, figures, phases, "")
+def test_a_refit_comes_nearer_to_the_tables_than_the_printed_numbers():
+    printed, data = load_model("serres2008"), diagnosed((150.0, 400.0), (150.0, 900.0))
+    refitted = Rig.of(data, printed).fit((), printed)
+    before, after = (rms(limit_errors(each, data)["extension_mm"]) for each in (printed, refitted))
+    assert after < 0.5 * before
 
 
-def test_the_page_and_the_tables_say_what_was_found():
-    result = Measured(
-        rounds=[
-            Round(47, "effect", "It is creep.", ("creep",), {"creep": 0.001},
-                  [("hysteresis", 5.0, 0.001, "explains these data as well as creep")],
-                  (), None, {}),
-            Round(47, "agrees", "Nothing more.", (), {}, [], (), None, {}),
-        ],
-        steps=[step("as given", (), 9.9), step("creep", ("creep",), 0.7)],
-        folds={key: 0.8 for key, _ in COLUMNS},
-        floors={key: 0.6 for key, _ in COLUMNS},
-        seconds=1.0,
-        settings={"model": "serres2008"},
-    )  # fmt: skip
-    said = StringIO()
-    print_measured(result, Console(file=said))
-    page = measured_page(result)
-    for text in (said.getvalue(), page):
-        assert "target 1 mm: met" in text
-        assert "hysteresis" in text
+@pytest.mark.campaign
+def test_a_job_judges_what_a_diagnosis_adds_as_the_notebook_has_it(monkeypatch, tmp_path):
+    found = iter(["nonlinear_stiffness", ""])
+
+    def diagnose(data, model, **_):
+        added = [SimpleNamespace(name=name, why=ADDED) for name in [next(found)] if name]
+        return SimpleNamespace(sentence="", verdict="effect", candidates=added, model=model)
+
+    monkeypatch.setattr(diagnose_tables, "diagnose", diagnose)
+    extension = [each["extension_mm"] for each in run_measured(tmp_path).values()]
+    assert extension == pytest.approx([10.31, 3.40, 1.52, 0.60], abs=0.06)
+    assert "nonlinear_stiffness" in load_model(tmp_path / "model.toml").parameters

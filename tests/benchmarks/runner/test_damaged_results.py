@@ -6,7 +6,6 @@ import pytest
 
 from benchmarks.hidden_effects.generation.cases import Block
 from benchmarks.hidden_effects.run_blocks import Order, run_block
-from benchmarks.measured.rounds import Stages
 from benchmarks.runner.journal import JOURNAL, case_rows
 from benchmarks.runner.provenance import RUN, check_run, finished_rows, read_run
 from benchmarks.suites.suite import SuiteError
@@ -119,17 +118,6 @@ def test_rows_of_another_schema_count_as_not_run(tmp_path, capsys):
     assert list(case_rows(tmp_path / JOURNAL)) == [ROW, ROW]
     said = warnings_in(capsys.readouterr().err)
     assert len(said) == 1 and "and 3 more" in said[0]
-
-
-@pytest.mark.parametrize("rubbish", KINDS_OF_RUBBISH)
-def test_damaged_stages_are_made_anew(tmp_path, rubbish, capsys):
-    stages = Stages(tmp_path, code="now")
-    stages.keep("one", "asked", {"numbers": [1]})
-    assert stages.kept("one", "asked", lambda numbers: numbers) == [1]
-    (tmp_path / "one.json").write_bytes(RUBBISH[rubbish])
-    assert stages.kept("one", "asked", lambda numbers: numbers) is None
-    assert stages.others() == ""
-    assert len(warnings_in(capsys.readouterr().err)) == (rubbish != "types")
 
 
 def test_damaged_rows_of_gains_are_tuned_anew_and_the_others_stay(tmp_path, capsys):

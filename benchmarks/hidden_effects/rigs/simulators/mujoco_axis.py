@@ -181,19 +181,16 @@ def _native(rig: Rig, effect: HiddenEffect) -> bool:
     if isinstance(effect, (laws.Spring, laws.EndBumper)):
         return True
     if rig.kind == "slide":
-        return isinstance(effect, (laws.ConstantForce, laws.HardeningSpring, laws.QuadraticDrag))
+        return isinstance(effect, (laws.HardeningSpring, laws.QuadraticDrag))
     return not rig.gravity and isinstance(effect, laws.Gravity)
 
 
 def _document(rig: Rig, effects: list[HiddenEffect], h: float) -> str:
     """MJCF of a rig: a slide along x, or a hinge about y that swings in the plane of gravity."""
-    pull, density, tendons, spring = 0.0, 0.0, "", rig.stiffness
+    density, tendons, spring = 0.0, "", rig.stiffness
     weight, angle = rig.gravity, rig.gravity_angle
     for effect in effects:
-        if isinstance(effect, laws.ConstantForce):
-            # The rail is tilted.
-            pull = effect.size / _inertia(rig, h)
-        elif isinstance(effect, laws.QuadraticDrag):
+        if isinstance(effect, laws.QuadraticDrag):
             # Of a box with the body's inertia: 2 density width height speed^2.
             density = effect.size / (3.0 * RADIUS**2)
         elif isinstance(effect, laws.Spring):
@@ -214,7 +211,7 @@ def _document(rig: Rig, effects: list[HiddenEffect], h: float) -> str:
     down = -GRAVITY if rig.kind == "joint" else 0.0
     return f"""<mujoco>
   <compiler angle="radian" inertiafromgeom="false" boundmass="0" boundinertia="0"/>
-  <option timestep="{h!r}" integrator="implicitfast" gravity="{pull!r} 0 {down!r}"
+  <option timestep="{h!r}" integrator="implicitfast" gravity="0 0 {down!r}"
           density="{density!r}" iterations="100" tolerance="1e-14"/>
   <worldbody>{anchors}
     <body>{_body(rig, weight, angle, h)}

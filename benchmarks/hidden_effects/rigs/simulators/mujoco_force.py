@@ -22,7 +22,7 @@ record of a machine tells less."""
 def simulate(
     rig: ImposedRig, effects: tuple[HiddenEffect, ...], motion: Reference, pressure: float
 ) -> Array:
-    """Force of the drive (N), shape (rows,); as `imposed_force.simulate`, without a play."""
+    """Force of the drive (N), shape (rows,); as `imposed_force.simulate`."""
     slide = Rig(
         "slide",
         rig.mass + 0.5 * STEP * rig.damping,

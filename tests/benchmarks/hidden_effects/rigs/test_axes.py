@@ -101,7 +101,6 @@ STEADY = (
     (laws.QuadraticDrag(5.0), 2.0, math.sqrt(2.0 / 5.0)),
     (laws.DirectionalDamping(4.0), 2.0, 0.5),
     (laws.DirectionalDamping(4.0), -2.0, None),
-    (laws.ConstantForce(-2.0), 2.0, 0.0),
     (laws.LoadFriction(0.25), 8.0, None),
 )
 
@@ -159,7 +158,6 @@ POSITION_LAWS = (
     laws.Detent(2.0, 0.01, 0.01),
     laws.EndBumper(300.0, 0.02),
     laws.EddyBrake(5.0, 0.01, 0.01),
-    laws.PositionFriction(0.5, 8.0),
 )
 
 

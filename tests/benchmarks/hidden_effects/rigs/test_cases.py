@@ -9,14 +9,14 @@ import pytest
 
 from benchmarks.hidden_effects.evaluation.scoring import count
 from benchmarks.hidden_effects.evaluation.verdicts import compare
+from benchmarks.hidden_effects.generation.cases import BLOCKS
 from benchmarks.hidden_effects.generation.files import write_case
-from benchmarks.hidden_effects.generation.undecidable import BLOCKS
 from benchmarks.hidden_effects.rigs import drawing, effect_size, files
 from benchmarks.hidden_effects.rigs.drawing import KNOWN, OFFERS, catalogue_name, group
 from benchmarks.hidden_effects.rigs.driven_campaign import draw_driven
 from benchmarks.hidden_effects.rigs.effect_size import expected
 from benchmarks.hidden_effects.rigs.files import GERMAN, METRES, OURS
-from benchmarks.hidden_effects.rigs.laws import ConstantForce, CoulombFriction, PressureFriction
+from benchmarks.hidden_effects.rigs.laws import CoulombFriction, Gravity, PressureFriction
 from benchmarks.hidden_effects.rigs.rig import draw_joint, draw_slide
 from pma_gym.data.datasets.dataset import read_dataset
 from pma_gym.effects import CATALOGUE
@@ -67,8 +67,8 @@ def test_a_pilot_is_the_beginning_of_its_file():
     """Each effect's size is set on the bits that the file then has."""
     rng = np.random.default_rng(5)
     campaign = draw_driven(rng, "slide", "own", (5, 1))
-    short, long = (campaign.run((), 0, seconds) for seconds in (2.0, 3.0))
-    assert np.array_equal(long.readings[: len(short.readings)], short.readings)
+    short, long = (campaign.run((), 0, seconds)[1] for seconds in (2.0, 3.0))
+    assert np.array_equal(long[: len(short)], short)
 
 
 @pytest.mark.parametrize("kind", ["slide", "joint"])
@@ -79,8 +79,7 @@ def test_no_effect_has_no_size(kind, simulator):
         pytest.importorskip("mujoco")
     for seed in (2, 3):
         campaign = draw_driven(np.random.default_rng(seed), kind, simulator, (5, seed))
-        motion = (run := campaign.run((), 0, 4.0)).motion
-        plain = effect_size.change(campaign.rig, [motion], [run.exact])
+        plain = effect_size.change(campaign.rig, campaign.run((), 0, 4.0)[0])
         assert effect_size.size(plain, campaign.sensor.rms) < 1e-3
 
 
@@ -93,7 +92,7 @@ def test_a_lab_without_rest_or_repeat_states_its_tolerance():
     # The drive is off while it rests, and every reading is of one place.
     rows = [line.split(",") for line in texts["run_01.csv"].splitlines()[1:100]]
     assert {float(row[1]) for row in rows} == {0.0}
-    pulled = campaign.texts([ConstantForce(0.1 * campaign.rig.peak_force)])
+    pulled = campaign.texts([Gravity(0.1 * campaign.rig.peak_force, 0.5)])
     stated = float(pulled["dataset.toml"].split("contraction_mm = ")[1].split()[0])
     assert stated == pytest.approx(1e3 * campaign.sensor.rms, rel=1e-5)
 

@@ -47,36 +47,12 @@ def test_a_loop_takes_four_times_friction_and_amplitude_and_what_is_viscous(simu
     assert work == pytest.approx(wanted, rel=3e-3)
 
 
-def test_friction_opposes_a_motion_and_a_push_of_the_part_is_held(simulate):
-    # A motion towards positive q needs more force, one back less, with the friction of there.
-    added = simulate(RIG, (laws.PositionFriction(6.0, 10.0),), SINE, 1e5) - simulate(
-        RIG, (), SINE, 1e5
-    )
-    fast = (np.abs(SINE.v) > 0.05) & (TIME > 0.2)
-    wanted = np.sign(SINE.v) * 6.0 * (1.0 + 10.0 * SINE.q)
-    assert added[fast] == pytest.approx(wanted[fast], abs=1e-6)
-    held = simulate(RIG, (laws.ConstantForce(4.0),), SINE, 1e5) - simulate(RIG, (), SINE, 1e5)
-    assert held == pytest.approx(-4.0, abs=1e-6)
-
-
 def test_friction_grows_with_pressure(simulate):
     effect = (laws.PressureFriction(4.0, 1.5e-6),)
     fast = (SINE.v > 0.05) & (TIME > 0.2)
     for pressure in (1e5, 7e5):
         added = simulate(RIG, effect, SINE, pressure) - simulate(RIG, (), SINE, pressure)
         assert added[fast] == pytest.approx(4.0 * (1.0 + 1.5e-6 * pressure), abs=1e-6)
-
-
-def test_after_a_turn_the_play_is_crossed_without_friction():
-    effects = (laws.CoulombFriction(6.0), laws.Backlash(0.01))
-    added = imposed_force.simulate(RIG, effects, SINE, 1e5) - imposed_force.simulate(
-        RIG, (), SINE, 1e5
-    )
-    # From the turn at 0.5 s on it moves back; 10 mm and the presliding of both sides are crossed.
-    back = slice(250, 700)
-    free = SINE.q[back][np.abs(added[back]) < 1e-9]
-    assert 0.05 - free.min() == pytest.approx(0.01 + 5e-4 * 0.05, abs=5e-4)
-    assert np.abs(added[500:700] + 6.0).max() < 1e-9
 
 
 DRAWN = (
@@ -122,7 +98,6 @@ MEASURED = (
         pytest.param(name, marks=pytest.mark.campaign)
         for name in (
             "pressure_dependent_friction",
-            "position_dependent_friction",
             "quadratic_drag",
             "directional_damping",
             "cogging",
@@ -144,11 +119,6 @@ def test_what_a_testing_machine_can_show_is_hidden_at_any_size(name, seed):
     small, large = campaign.ratio(most.scaled(0.01)), campaign.ratio(most.scaled(0.02))
     assert large == pytest.approx(2.0 * small, rel=0.02)
     assert campaign.ratio(most.scaled(0.0)) < 1e-9
-
-
-def test_a_constant_force_is_a_zero_of_the_load_cell():
-    campaign = draw_tested(np.random.default_rng(0), "imposed", "own", (3, 0))
-    assert campaign.ratio(laws.ConstantForce(campaign.rig.peak_force)) < 1e-6
 
 
 def test_files_have_the_load_cell_s_noise_and_step():

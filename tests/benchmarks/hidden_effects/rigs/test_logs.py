@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from benchmarks.hidden_effects.rigs import effect_size, laws
-from benchmarks.hidden_effects.rigs.laws import SensorLink
 from benchmarks.hidden_effects.rigs.rig import Rig
-from benchmarks.hidden_effects.rigs.sensing import Noise, Sensed, Sensor
+from benchmarks.hidden_effects.rigs.sensing import Noise, Sensor
 from benchmarks.hidden_effects.rigs.simulators import stick_slip
 from benchmarks.hidden_effects.rigs.simulators.drive import Drive, Transmission
 
@@ -54,26 +53,9 @@ def test_a_drive_may_be_stronger_forwards():
     assert forces[0] == pytest.approx(2.2) and forces[-1] == pytest.approx(-1.8)
 
 
-def sensed(readings, positions, step=1e-9):
-    sensor = Sensor("encoder", step, Noise(0.0))
-    each = Sensed(sensor, np.zeros(len(positions)), readings, INTERVAL)
-    return np.array([each.read(q) for q in positions])
-
-
-def test_readings_are_late_and_have_play():
-    positions = np.sin(np.linspace(0.0, 9.0, 300))
-    late = sensed([SensorLink(delay=0.025)], positions)
-    rows = np.arange(300)
-    assert late == pytest.approx(np.interp(rows - 2.5, rows, positions), abs=1e-8)
-    played = sensed([SensorLink(play=0.2)], positions)
-    assert played.max() == pytest.approx(positions.max() - 0.1, abs=1e-6)
-    # Past the turn it waits until the play is used up.
-    assert played[20:70] == pytest.approx(np.maximum.accumulate(positions)[20:70] - 0.1, abs=1e-8)
-    assert played[80:150] == pytest.approx(positions[80:150] + 0.1, abs=1e-8)
-
-
 def test_an_encoder_rounds_to_its_step():
-    read = sensed([], np.array([0.1234, -0.1266]), step=0.01)
+    sensor = Sensor("encoder", 0.01, Noise(0.0))
+    read = [sensor.reading(q, 0.0) for q in (0.1234, -0.1266)]
     assert read == pytest.approx([0.12, -0.13])
 
 
@@ -123,10 +105,10 @@ def moved(axis, *effects):
 
 def test_what_a_refit_can_do_is_no_effect():
     heavier = Rig(**(vars(AXIS) | {"inertia": 2.02, "damping": 6.1}))
-    plain = effect_size.change(AXIS, [m := moved(AXIS)], [m.q])
-    other = effect_size.change(AXIS, [m := moved(heavier)], [m.q])
+    plain = effect_size.change(AXIS, moved(AXIS))
+    other = effect_size.change(AXIS, moved(heavier))
     assert effect_size.size(plain, 1e-6) < 0.1
-    bent = effect_size.change(AXIS, [m := moved(AXIS, laws.CoulombFriction(0.1))], [m.q])
+    bent = effect_size.change(AXIS, moved(AXIS, laws.CoulombFriction(0.1)))
     # 1 % of inertia moves it by half a millimetre; of second order, a little stays.
     assert effect_size.size(other, 1e-6) < 0.15 * effect_size.size(bent, 1e-6)
 
@@ -137,7 +119,7 @@ def test_the_size_is_the_misfit_of_a_refitted_model():
     from scipy.optimize import least_squares
 
     hidden = moved(AXIS, laws.CoulombFriction(0.05))
-    ratio = effect_size.size(effect_size.change(AXIS, [hidden], [hidden.q]), 1e-5)
+    ratio = effect_size.size(effect_size.change(AXIS, hidden), 1e-5)
     rows = 1250  # the slowest period of the reference: 2.5 s
 
     def misfit(x):
