@@ -248,21 +248,10 @@ class FitProblem:
         """
         if not self.far(fit):
             return fit
-        refit = self.eased_fit(fit.model, extra, self.left(fit))
-        return min(filter(None, (fit, refit)), key=_chi_square)
-
-    def eased_fit(
-        self, model: Model, extra: Sequence[CandidateEffect], left: float
-    ) -> Fitted | None:
-        """Fit a model to noise as large as a residual, then to ever less noise.
-
-        Args:
-            model: where its own parameters begin.
-            extra: the candidates in it.
-            left: rms of the residual, in standard deviations of the noise.
-        """
+        left = self.left(fit)
         ever_less = [left / EASIER**k for k in range(int(np.log(left) / np.log(EASIER)) + 1)]
-        return self.fit(self._eased(model, extra, ever_less), extra)
+        refit = self.fit(self._eased(fit.model, extra, ever_less), extra)
+        return min(filter(None, (fit, refit)), key=_chi_square)
 
     def _eased(
         self, model: Model, extra: Sequence[CandidateEffect], larger: Sequence[float]

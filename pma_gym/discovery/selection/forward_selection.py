@@ -29,7 +29,6 @@ from pma_gym.discovery.selection.candidate_fits import (
 from pma_gym.discovery.selection.exchanged_effects import exchanged
 from pma_gym.discovery.selection.further_terms import further_terms
 from pma_gym.discovery.selection.instead_of_terms import instead_of_term
-from pma_gym.discovery.selection.rugged_fits import is_rugged, settled
 from pma_gym.discovery.selection.scanned_parameters import with_scanned
 from pma_gym.discovery.selection.stages import Stage, stage_of
 from pma_gym.discovery.selection.tried_candidates import Progress
@@ -90,8 +89,6 @@ def select(
     problem = replace(problem, noise=reestimated_noise(problem, best, chosen))
     fit = refit(problem, best, chosen, journal)
     chosen, fit = with_scanned(problem, fit, chosen, journal, ends_rigid=True)
-    if is_rugged(fit, chosen):
-        fit = settled(problem, replace(fit, spread=best.spread), chosen)
     fit = replace(fit, covariance=covariance(problem, fit, chosen))
     return replace(added, chosen=chosen, fit=fit, problem=problem)
 
@@ -124,7 +121,7 @@ def _with_added(
             break
         new = next(each for each in candidates if each.name == added)
         chosen = (*chosen, stage.scanned.get(added, new))
-        best = better(problem, stage.fits[added], chosen, stage.before, journal)
+        best = better(problem, stage.fits[added], chosen, journal)
         chosen, best = with_scanned(problem, best, chosen, journal)
         chosen, best = without_idle(problem, best, chosen, refitted, journal)
         if not chosen and best.chi_square < refitted.chi_square and anew < BEGINNINGS:
