@@ -111,7 +111,7 @@ def stage_of(
     tried = Tried()
     if gate:
         beside = problem, baseline, before, chosen
-        tried = fits_of_candidates(*beside, scores, far, not astray, journal, progress)
+        tried = fits_of_candidates(*beside, scores, not astray, journal, progress)
     gains = [before.chi_square - fit.chi_square for fit in tried.fits.values()]
     if scan.excess and all(gain < least for gain in gains):
         gate, tried, scores, scan = (), replace(tried, fits={}), plainly, NO_EXCESS

@@ -10,7 +10,6 @@ from pma_gym.discovery.screening.probe_scores import Baseline
 from pma_gym.discovery.screening.score_test import ScreeningScore
 from pma_gym.discovery.selection.candidate_fits import fitted, restarted, unfitted
 from pma_gym.discovery.selection.scanned_parameters import likeliest_scanned
-from pma_gym.discovery.selection.unscored_fits import unscored_fits
 
 TRIED, NEAR = 8, 0.05
 """How many candidates are fitted at most, and the share of the best look's gain that one needs."""
@@ -33,7 +32,6 @@ def fits_of_candidates(
     before: Fitted,
     chosen: tuple[CandidateEffect, ...],
     scores: Sequence[ScreeningScore],
-    far: bool,
     restarts: bool,
     journal: Journal,
     progress: Progress,
@@ -46,7 +44,6 @@ def fits_of_candidates(
         before: the same.
         chosen: the effects in it.
         scores: of all candidates, the best first.
-        far: whether what is left is many times the noise, so that scores tell little.
         restarts: whether fits that come near no trial are begun again.
         journal: keeps fits.
         progress: called with a step's name, what is done and the total.
@@ -59,10 +56,6 @@ def fits_of_candidates(
         if refit is not None:
             fits[each.candidate.name] = refit
     beside, scored = (problem, baseline, before, chosen), dict(fits)
-    if far:
-        names = {each.candidate.name for each in worth[:TRIED]}
-        others = [each for each in scores if each.candidate.name not in names]
-        fits |= unscored_fits(*beside, others, fits, journal, progress)
     moved: dict[str, CandidateEffect] = {}
     if restarts:
         scanned = likeliest_scanned(problem, chosen, worth, fits, journal)
