@@ -80,9 +80,6 @@ def stage_of(
     progress: Progress,
 ) -> Stage:
     """One round of candidates (`rest`) beside a model with some effects (`before`, `chosen`)."""
-    shared, astray = problem, problem.astray(before)
-    if astray:
-        problem, before = _as_assumed(problem, before, chosen)
     step = f"looking for effect {len(chosen) + 1}"
     progress(step, 0, len(rest))
     baseline = Baseline.at(
@@ -111,12 +108,12 @@ def stage_of(
     tried = Tried()
     if gate:
         beside = problem, baseline, before, chosen
-        tried = fits_of_candidates(*beside, scores, not astray, journal, progress)
+        tried = fits_of_candidates(*beside, scores, journal, progress)
     gains = [before.chi_square - fit.chi_square for fit in tried.fits.values()]
     if scan.excess and all(gain < least for gain in gains):
         gate, tried, scores, scan = (), replace(tried, fits={}), plainly, NO_EXCESS
     return Stage(
-        shared,
+        problem,
         before,
         baseline,
         tuple(scores),
@@ -127,18 +124,6 @@ def stage_of(
         tried.unfitted,
         tried.scanned,
     )
-
-
-def _as_assumed(
-    problem: FitProblem, before: Fitted, chosen: tuple[CandidateEffect, ...]
-) -> tuple[FitProblem, Fitted]:
-    """Trials and fit within what was assumed of the parameters.
-
-    A motor that is all but locked hides what holds it. Looks and fits begin beside what was assumed
-    of the parameters, and stay there until an effect is added.
-    """
-    held = problem.fit_as_assumed(before, chosen)
-    return replace(problem, widens=False), before if held is None else held
 
 
 def _refined_scores(

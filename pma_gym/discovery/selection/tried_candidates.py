@@ -32,7 +32,6 @@ def fits_of_candidates(
     before: Fitted,
     chosen: tuple[CandidateEffect, ...],
     scores: Sequence[ScreeningScore],
-    restarts: bool,
     journal: Journal,
     progress: Progress,
 ) -> Tried:
@@ -44,7 +43,6 @@ def fits_of_candidates(
         before: the same.
         chosen: the effects in it.
         scores: of all candidates, the best first.
-        restarts: whether fits that come near no trial are begun again.
         journal: keeps fits.
         progress: called with a step's name, what is done and the total.
     """
@@ -56,11 +54,9 @@ def fits_of_candidates(
         if refit is not None:
             fits[each.candidate.name] = refit
     beside, scored = (problem, baseline, before, chosen), dict(fits)
-    moved: dict[str, CandidateEffect] = {}
-    if restarts:
-        scanned = likeliest_scanned(problem, chosen, worth, fits, journal)
-        fits |= {name: fit for name, (_, fit) in scanned.items()}
-        better_ones = restarted(*beside, worth, scored, fits, journal, progress)
-        fits |= better_ones
-        moved = {name: each for name, (each, _) in scanned.items() if name not in better_ones}
+    scanned = likeliest_scanned(problem, chosen, worth, fits, journal)
+    fits |= {name: fit for name, (_, fit) in scanned.items()}
+    better_ones = restarted(*beside, worth, scored, fits, journal, progress)
+    fits |= better_ones
+    moved = {name: each for name, (each, _) in scanned.items() if name not in better_ones}
     return Tried(fits, unfitted(*beside, worth[:TRIED], fits), moved)
