@@ -119,8 +119,7 @@ def _with_added(
             if other is not None:
                 stages[-1], chosen, best = other
             break
-        new = next(each for each in candidates if each.name == added)
-        chosen = (*chosen, stage.scanned.get(added, new))
+        chosen = (*chosen, next(each for each in candidates if each.name == added))
         best = better(problem, stage.fits[added], chosen, journal)
         chosen, best = with_scanned(problem, best, chosen, journal)
         chosen, best = without_idle(problem, best, chosen, refitted, journal)

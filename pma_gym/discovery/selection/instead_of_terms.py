@@ -52,8 +52,7 @@ def instead_of_term(
             for name, other in stage.fits.items():
                 gain = stage.before.chi_square - other.chi_square
                 if cost(other) < least and is_worth(stage, gain):
-                    new = stage.scanned.get(name, known[name])
-                    least, best = cost(other), (stage, new, other)
+                    least, best = cost(other), (stage, known[name], other)
     if best is None:
         return None
     stage, new, other = best

@@ -6,8 +6,8 @@ data sets. It opens too where the residual itself is no noise: where it is many 
 are too large for noise (`scan_statistic`) and an effect explains them.
 """
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
 from pma_gym.discovery.fitting.fit_problem import FitProblem, Fitted
@@ -18,7 +18,7 @@ from pma_gym.discovery.screening.scan_statistic import NO_EXCESS, ScanStatistic
 from pma_gym.discovery.screening.score_test import ScreeningScore, screen
 from pma_gym.discovery.screening.starting_points import refined_score
 from pma_gym.discovery.selection.candidate_fits import probed
-from pma_gym.discovery.selection.tried_candidates import Progress, Tried, fits_of_candidates
+from pma_gym.discovery.selection.tried_candidates import Progress, fits_of_candidates
 
 ALARM = 0.005
 """Family-wise rate of false alarms that the gate lets through."""
@@ -55,7 +55,6 @@ class Stage:
         scan: pieces of it that opened the gate by themselves.
         unfitted: candidates that could not be fitted: their range, simulated, promises more than
             any fit brings, and their own fits bring far less although a refit keeps the promise.
-        scanned: candidates that were fitted with held parameters at other values, by name.
     """
 
     problem: FitProblem
@@ -67,7 +66,6 @@ class Stage:
     missing: bool
     scan: ScanStatistic = NO_EXCESS
     unfitted: tuple[str, ...] = ()
-    scanned: Mapping[str, CandidateEffect] = field(default_factory=dict)
 
 
 def stage_of(
@@ -105,24 +103,24 @@ def stage_of(
         least = max(CARRIED * scan.excess, _least_change(problem) ** 2 * rows)
         scores = _refined_scores(problem, baseline, before, scores, scan.chance, least)
         gate = tuple(each for each in scores if each.starts)
-    tried = Tried()
+    fits: dict[str, Fitted] = {}
+    unfitted: tuple[str, ...] = ()
     if gate:
         beside = problem, baseline, before, chosen
-        tried = fits_of_candidates(*beside, scores, journal, progress)
-    gains = [before.chi_square - fit.chi_square for fit in tried.fits.values()]
+        fits, unfitted = fits_of_candidates(*beside, scores, journal, progress)
+    gains = [before.chi_square - fit.chi_square for fit in fits.values()]
     if scan.excess and all(gain < least for gain in gains):
-        gate, tried, scores, scan = (), replace(tried, fits={}), plainly, NO_EXCESS
+        gate, fits, scores, scan = (), {}, plainly, NO_EXCESS
     return Stage(
         problem,
         before,
         baseline,
         tuple(scores),
-        tried.fits,
+        fits,
         gate,
         missing,
         scan,
-        tried.unfitted,
-        tried.scanned,
+        unfitted,
     )
 
 
