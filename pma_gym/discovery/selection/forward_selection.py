@@ -2,8 +2,7 @@
 
 In each round (`stages`) every candidate is scored; what passes the gate is fitted together with the
 model's parameters; the likeliest is added; then the same again beside it. Each effect is then left
-out once, and stays out if the fit is as good without it, or is exchanged for another that explains
-more beside the rest. Where nothing passes any more, further terms of the laws that were added are
+out once, and stays out if the fit is as good without it. Where nothing passes any more, further terms of the laws that were added are
 fitted (`further_terms`). The noise is estimated again only when all effects are selected: before,
 an autoregression would take the next effect for noise.
 """
@@ -26,7 +25,6 @@ from pma_gym.discovery.selection.candidate_fits import (
     refit,
     without_idle,
 )
-from pma_gym.discovery.selection.exchanged_effects import exchanged
 from pma_gym.discovery.selection.further_terms import further_terms
 from pma_gym.discovery.selection.instead_of_terms import instead_of_term
 from pma_gym.discovery.selection.scanned_parameters import with_scanned
@@ -85,7 +83,7 @@ def select(
         progress: called with a step's name, what is done and the total.
     """
     added = _with_added(problem, refitted, candidates, seed, journal, progress)
-    chosen, best = exchanged(problem, added.fit, added.chosen, added.stages, candidates)
+    chosen, best = added.chosen, added.fit
     problem = replace(problem, noise=reestimated_noise(problem, best, chosen))
     fit = refit(problem, best, chosen, journal)
     chosen, fit = with_scanned(problem, fit, chosen, journal, ends_rigid=True)
