@@ -2,9 +2,9 @@
 
 In each round (`stages`) every candidate is scored; what passes the gate is fitted together with the
 model's parameters; the likeliest is added; then the same again beside it. Each effect is then left
-out once, and stays out if the fit is as good without it. Where nothing passes any more, further terms of the laws that were added are
-fitted (`further_terms`). The noise is estimated again only when all effects are selected: before,
-an autoregression would take the next effect for noise.
+out once, and stays out if the fit is as good without it. Where nothing passes any more, further
+terms of the laws that were added are fitted (`further_terms`). The noise is estimated again only
+when all effects are selected: before, an autoregression would take the next effect for noise.
 """
 
 from collections.abc import Mapping, Sequence
