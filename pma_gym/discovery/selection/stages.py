@@ -6,7 +6,7 @@ data sets. It opens too where the residual itself is no noise: where it is many 
 are too large for noise (`scan_statistic`) and an effect explains them.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
@@ -17,8 +17,45 @@ from pma_gym.discovery.screening.residuals import far_off, is_autocorrelated, sc
 from pma_gym.discovery.screening.scan_statistic import NO_EXCESS, ScanStatistic
 from pma_gym.discovery.screening.score_test import ScreeningScore, screen
 from pma_gym.discovery.screening.starting_points import refined_score
-from pma_gym.discovery.selection.candidate_fits import probed
-from pma_gym.discovery.selection.tried_candidates import Progress, fits_of_candidates
+from pma_gym.discovery.selection.candidate_fits import fitted, probed, restarted, unfitted
+
+TRIED, NEAR = 8, 0.05
+"""How many candidates are fitted at most, and the share of the best look's gain that one needs."""
+
+Progress = Callable[[str, int, int], None]
+
+
+def fits_of_candidates(
+    problem: FitProblem,
+    baseline: Baseline,
+    before: Fitted,
+    chosen: tuple[CandidateEffect, ...],
+    scores: Sequence[ScreeningScore],
+    journal: Journal,
+    progress: Progress,
+) -> tuple[dict[str, Fitted], tuple[str, ...]]:
+    """Fits of the candidates that may be worth one, by name, and those that could not be fitted.
+
+    Args:
+        problem: the trials.
+        baseline: the model that they are tried beside, ready to be looked beside.
+        before: the same.
+        chosen: the effects in it.
+        scores: of all candidates, the best first.
+        journal: keeps fits.
+        progress: called with a step's name, what is done and the total.
+    """
+    fits: dict[str, Fitted] = {}
+    worth = [each for each in scores if each.gain > NEAR * scores[0].gain and each.starts]
+    for number, each in enumerate(worth[:TRIED]):
+        progress(f"fitting effect {len(chosen) + 1}", number, len(worth[:TRIED]))
+        refit = fitted(problem, baseline, before, chosen, each, journal)
+        if refit is not None:
+            fits[each.candidate.name] = refit
+    beside, scored = (problem, baseline, before, chosen), dict(fits)
+    fits |= restarted(*beside, worth, scored, fits, journal, progress)
+    return fits, unfitted(*beside, worth[:TRIED], fits)
+
 
 ALARM = 0.005
 """Family-wise rate of false alarms that the gate lets through."""
