@@ -107,6 +107,7 @@ class FitProblem:
         threads: how many threads simulate.
         coarse: whether a sensor keeps to coarser steps than its DAQ gives.
         files: the file that each trial comes from; empty where each is a file of its own.
+        widens: whether a parameter may go beyond what is assumed of it beforehand.
     """
 
     trials: Sequence[Trial]
@@ -116,6 +117,7 @@ class FitProblem:
     threads: int = 1
     coarse: bool = False
     files: tuple[str, ...] = ()
+    widens: bool = True
 
     def whitened_residuals(
         self,
@@ -204,6 +206,20 @@ class FitProblem:
         """Whether a fit is so far from the trials that it may be in a local minimum."""
         return self.left(fit) > CAUGHT
 
+    def astray(self, fit: Fitted) -> bool:
+        """Whether own parameters make up for structure: beyond what is assumed, and yet far."""
+        return self.far(fit) and any(path in self.own.free for path in fit.reach)
+
+    def fit_as_assumed(self, fit: Fitted, extra: Sequence[CandidateEffect] = ()) -> Fitted | None:
+        """A fit from the given parameters, within what is assumed of them, in place of another.
+
+        Args:
+            fit: the other, whose effects stay as they are to begin with.
+            extra: the candidates in it.
+        """
+        own = dict(zip(self.own.free, values(self.given, self.own.free).tolist(), strict=True))
+        return replace(self, widens=False).fit(fit.model.replace(own), extra)
+
     def careful_fit(self, model: Model, extra: Sequence[CandidateEffect] = ()) -> Fitted | None:
         """Fit a model with candidates in it, whose parameters may be far off.
 
@@ -289,7 +305,7 @@ class FitProblem:
         except ValueError:
             return None
         converged = search.run(ROUNDS)
-        for _ in range(MOST_DOUBLINGS):
+        for _ in range(MOST_DOUBLINGS if self.widens else 0):
             edges = whitened.at_assumed_edge(search.values)
             if not edges:
                 break

@@ -31,6 +31,7 @@ def fits_of_candidates(
     before: Fitted,
     chosen: tuple[CandidateEffect, ...],
     scores: Sequence[ScreeningScore],
+    restarts: bool,
     journal: Journal,
     progress: Progress,
 ) -> tuple[dict[str, Fitted], tuple[str, ...]]:
@@ -42,6 +43,7 @@ def fits_of_candidates(
         before: the same.
         chosen: the effects in it.
         scores: of all candidates, the best first.
+        restarts: whether fits that come near no trial are begun again.
         journal: keeps fits.
         progress: called with a step's name, what is done and the total.
     """
@@ -53,7 +55,8 @@ def fits_of_candidates(
         if refit is not None:
             fits[each.candidate.name] = refit
     beside, scored = (problem, baseline, before, chosen), dict(fits)
-    fits |= restarted(*beside, worth, scored, fits, journal, progress)
+    if restarts:
+        fits |= restarted(*beside, worth, scored, fits, journal, progress)
     return fits, unfitted(*beside, worth[:TRIED], fits)
 
 
@@ -115,6 +118,9 @@ def stage_of(
     progress: Progress,
 ) -> Stage:
     """One round of candidates (`rest`) beside a model with some effects (`before`, `chosen`)."""
+    shared, astray = problem, problem.astray(before)
+    if astray:
+        problem, before = _as_assumed(problem, before, chosen)
     step = f"looking for effect {len(chosen) + 1}"
     progress(step, 0, len(rest))
     baseline = Baseline.at(
@@ -144,12 +150,12 @@ def stage_of(
     unfitted: tuple[str, ...] = ()
     if gate:
         beside = problem, baseline, before, chosen
-        fits, unfitted = fits_of_candidates(*beside, scores, journal, progress)
+        fits, unfitted = fits_of_candidates(*beside, scores, not astray, journal, progress)
     gains = [before.chi_square - fit.chi_square for fit in fits.values()]
     if scan.excess and all(gain < least for gain in gains):
         gate, fits, scores, scan = (), {}, plainly, NO_EXCESS
     return Stage(
-        problem,
+        shared,
         before,
         baseline,
         tuple(scores),
@@ -159,6 +165,18 @@ def stage_of(
         scan,
         unfitted,
     )
+
+
+def _as_assumed(
+    problem: FitProblem, before: Fitted, chosen: tuple[CandidateEffect, ...]
+) -> tuple[FitProblem, Fitted]:
+    """Trials and fit within what was assumed of the parameters.
+
+    Parameters far from what was assumed hide what is missing. Looks and fits begin beside what was
+    assumed of them, and stay there until an effect is added.
+    """
+    held = problem.fit_as_assumed(before, chosen)
+    return replace(problem, widens=False), before if held is None else held
 
 
 def _refined_scores(
