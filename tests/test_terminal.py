@@ -10,7 +10,7 @@ from rich.table import Table
 from typer.testing import CliRunner
 
 from benchmarks.__main__ import app as benchmarks
-from pma_gym.cli import app
+from pma_gym.cli import app, progress
 from pma_gym.documents import printable
 from pma_gym.pages.document import Formula, Heading, Paragraph, TextTable, to_html, to_markdown
 from pma_gym.plant.model import shipped_models
@@ -137,3 +137,18 @@ def test_markdown_keeps_names_in_their_place():
     assert len(rows) == 4 and rows[2].count("|") - rows[2].count("\\|") == 3
     assert "p < 0.01" in page and "`a<b`" in page
     assert "````text\n```\nx\n````" in page
+
+
+def test_lines_say_where_a_step_is_and_a_bar_does_on_a_terminal(monkeypatch, capsys):
+    times = iter((100.0, 150.0, 170.0, 180.0))
+    monkeypatch.setattr(progress.time, "monotonic", lambda: next(times))
+    with progress.StepProgress() as said:
+        for done in range(3):
+            said("trials left out", done, 5)
+    lines = capsys.readouterr().err.splitlines()
+    assert lines == ["trials left out ...", "trials left out 2 of 5 ..."]
+    monkeypatch.undo()
+    monkeypatch.setenv("FORCE_COLOR", "1")
+    bars = progress.StepProgress()
+    bars("trials left out", 1, 5)
+    assert bars._bars is not None and bars._bars.tasks[0].completed == 1

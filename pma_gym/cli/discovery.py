@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from pma_gym.cli.options import JsonOption
-from pma_gym.cli.progress import DIAGNOSIS, FIT, StepProgress, TimeLeft
+from pma_gym.cli.progress import StepProgress
 from pma_gym.cli.terminal import model_names, print_json, say, warnings_said, warnings_said_at_once
 from pma_gym.data.datasets.dataset import Dataset, read_dataset
 from pma_gym.files import OutputError
@@ -205,7 +205,6 @@ def diagnose(
             initial_model,
             results,
             {"seed": seed, "jobs": jobs, "journal": results.journal},
-            TimeLeft(DIAGNOSIS),
         )
         files = {
             "diagnosis.json": diagnosis.text().encode(),
@@ -254,7 +253,6 @@ def fit(
             initial_model,
             results,
             {"seed": seed, "jobs": jobs},
-            TimeLeft(FIT),
         )
         document = refitted.document()
         kept = {key: document[key] for key in _FITTED}
@@ -308,13 +306,12 @@ def _run(
     model: Model,
     results: Results,
     arguments: dict[str, Any],
-    time_left: TimeLeft,
 ) -> "Diagnosis":
     """Runs a diagnosis or a fit, with progress; Ctrl-C says how to go on."""
     try:
         from pma_gym.discovery.fitting.journal import JournalWarning
 
-        with StepProgress(time_left) as progress, warnings_said_at_once(JournalWarning):
+        with StepProgress() as progress, warnings_said_at_once(JournalWarning):
 
             def leave() -> None:
                 progress.__exit__()

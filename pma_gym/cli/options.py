@@ -74,24 +74,24 @@ def _with_effects(function: Callable[..., Any]) -> Callable[..., Any]:
     return run
 
 
-class _StrictCommand(TyperCommand):
+class _Strict:
+    """What a command and a group of them share."""
+
     def __init__(self, *arguments: Any, **options: Any) -> None:
         super().__init__(*arguments, **options)
         _make_strict(self)
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:  # noqa: ANN401
         with _nearest_option(self):
-            return super().parse_args(ctx, args)
+            return super().parse_args(ctx, args)  # type: ignore[misc]
 
 
-class _StrictGroup(TyperGroup):
-    def __init__(self, *arguments: Any, **options: Any) -> None:
-        super().__init__(*arguments, **options)
-        _make_strict(self)
+class _StrictCommand(_Strict, TyperCommand):
+    """A command."""
 
-    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:  # noqa: ANN401
-        with _nearest_option(self):
-            return super().parse_args(ctx, args)
+
+class _StrictGroup(_Strict, TyperGroup):
+    """A group of commands."""
 
 
 @contextmanager

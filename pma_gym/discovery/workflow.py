@@ -153,7 +153,7 @@ class _Work:
             return replace(said, warnings=words, seconds=dict(self.seconds))
         given, slower = with_recorded_bandwidth(given, trials)
         words = (*(dataset.checked or ()), *words, *slower)
-        journal = Journal(self.folder, trials, given, f"diagnosis 7 seed {self.seed}")
+        journal = Journal(self.folder, trials, given, f"diagnosis 8 seed {self.seed}")
         logged = [Logged.of(given, i, trial) for i, trial in enumerate(trials)]
         floors = self._timed("noise", lambda: initial_floors(given, logged, named, dataset.sensors))
         problem = self._problem(given, named, logged, floors)

@@ -14,7 +14,7 @@ from pma_gym.data.quality.clipping import at_daq_end
 from pma_gym.data.signals import VOLTAGE_RANGE, Signal
 from pma_gym.data.trial import Trial
 from pma_gym.plant import sensors
-from pma_gym.plant.model import Model, ModelError
+from pma_gym.plant.model import Model
 from pma_gym.plant.program import parameter_names
 from pma_gym.units import Quantity
 
@@ -101,18 +101,6 @@ class Logged:
         """Which signals have a reading that counts."""
         return [channel for channel, known in enumerate(self.measures) if known]
 
-    @cached_property
-    def there(self) -> list[slice | NDArray[np.bool_]]:
-        """Rows with a reading that counts, by output."""
-        return [self._there(channel) for channel in range(len(self.signals))]
-
-    def _there(self, channel: int) -> slice | NDArray[np.bool_]:
-        if not self.missing[channel].size:
-            return slice(None)
-        there = np.ones(len(self.time), bool)
-        there[self.missing[channel]] = False
-        return there
-
     @property
     def first(self) -> tuple[float, float]:
         """Commands in the first row (V)."""
@@ -130,36 +118,22 @@ class FreeParameter:
 
     Attributes:
         path: `effect.parameter_unit`, as in `Model.paths`.
-        name: `effect.parameter`, without a unit.
         place: its index in the vector of the compiled functions.
         quantity: its unit and bounds.
     """
 
     path: str
-    name: str
     place: int
     quantity: Quantity
 
 
 def free_parameters(model: Model, paths: Sequence[str]) -> list[FreeParameter]:
-    """Look up the free parameters of a model by their paths.
-
-    Raises:
-        ModelError: a path that the model does not have, a row of numbers or a sensor's noise.
-    """
+    """Look up the free parameters of a model by their paths."""
     names, parameters = parameter_names(model), []
-    # Its message names the nearest that there is.
-    model.replace({path: 0.0 for path in paths if path not in set(model.paths())})
     for path in paths:
         effect, _, file_key = path.partition(".")
         law = model.effects[effect]
         stem = law.names_in_files()[file_key]
-        if stem in law.rows or (effect in sensors.SENSORS and stem == "noise"):
-            raise ModelError(
-                f"{path} cannot be fitted: it is "
-                + ("a row of numbers" if stem in law.rows else "what residuals are counted in")
-            )
-        name = f"{effect}.{stem}"
-        place = 1 + names.index(name)
-        parameters.append(FreeParameter(path, name, place, law.quantities[stem]))
+        place = 1 + names.index(f"{effect}.{stem}")
+        parameters.append(FreeParameter(path, place, law.quantities[stem]))
     return parameters

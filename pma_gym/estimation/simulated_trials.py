@@ -1,8 +1,8 @@
 """Simulation of measured trials by a model at many values of its free parameters.
 
-Every trial begins in equilibrium at its first commands. If the initial hysteresis state, or the
-initial speed of a free rig, is unknown, each trial is simulated again with another initial state,
-and a linear combination of both simulations fits the measurements.
+Every trial begins in equilibrium at its first commands. If the initial hysteresis state is unknown,
+each trial is simulated again with another one, and a linear combination of both simulations fits
+the measurements.
 """
 
 import math
@@ -14,12 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pma_gym.data.trial import Trial
-from pma_gym.effects.ports import SENSOR_DELAY
-from pma_gym.estimation import initial_states
 from pma_gym.estimation.logged import Logged, free_parameters
-from pma_gym.integrator.equations import Interpolation, check_interpolation
-from pma_gym.plant import memory_start, sensors
-from pma_gym.plant.compiled_model import DEFAULT_TOLERANCE
+from pma_gym.plant import memory_start
 from pma_gym.plant.equilibrium import solver
 from pma_gym.plant.model import Model
 from pma_gym.plant.plant import Plant
@@ -44,9 +40,6 @@ class SimulatedTrials:
             voltages.
         trials: the trials, with measurements.
         free: paths of the free parameters.
-        tolerance: tolerance of the integrator, as in `Plant`.
-        interpolation: of the commands between rows: "foh" (first-order hold, linear) or "zoh" (each
-            held until the next).
         threads: how many threads share the work; the results' bits do not depend on it.
 
     Attributes:
@@ -54,14 +47,11 @@ class SimulatedTrials:
         factors: SI value of one unit in files of each, shape (p,).
         start: their values in the model, in file units, shape (p,).
         count: number of measurements in use.
-        deviations: standard deviations of the sensors (SI), shape (signals,).
-        trials: number of trials.
         balanced: whether each of the last parameter values has an equilibrium at the start of
             trials.
         attempts: steps of the integrator so far; all lanes of a SIMD register count as one.
     Raises:
-        ModelError: a path that the model does not have, a row of numbers or a sensor's noise.
-        ValueError: no trial, or one without measurements.
+        ValueError: a trial without measurements.
     """
 
     def __init__(
@@ -69,36 +59,20 @@ class SimulatedTrials:
         model: Model,
         trials: Sequence[Trial],
         free: Sequence[str],
-        tolerance: float = DEFAULT_TOLERANCE,
-        interpolation: Interpolation = "foh",
         threads: int = 1,
     ) -> None:
-        check_interpolation(interpolation)
-        self.plant, self.threads = Plant(model, tolerance), threads
-        self._ports = {effect.port for effect in model.effects.values()}
-        self.interpolation: Interpolation = interpolation
+        self.plant, self.threads = Plant(model), threads
         self.free = free_parameters(self.plant.model, free)
         indices = [parameter.place for parameter in self.free]
         self.factors = np.array([parameter.quantity.factor for parameter in self.free])
         self.start: Array = self.plant.vector[indices] / self.factors
         self.lower = np.array([parameter.quantity.lower for parameter in self.free], float)
         self.upper = np.array([parameter.quantity.upper for parameter in self.free], float)
-        self.deviations: Array = sensors.deviations(self.plant.model)
-        self.trials = len(trials)
-        if not trials:
-            raise ValueError("a fit needs at least one trial")
         self._trials = [Logged.of(self.plant.model, i, trial) for i, trial in enumerate(trials)]
         self.count = sum(logged.count for logged in self._trials)
         self._buffer, self.attempts = np.empty(0), 0
         self.balanced: NDArray[np.bool_] = np.ones(1, bool)
         self._own: list[tuple[int, Array]] = []
-        self._start_values: list[tuple[int, Array]] = []
-        if self.plant.model.rig.is_free:
-            where, speed = initial_states.starts(trials, self._trials)
-            paths = dict(
-                zip(self.plant.model.rig.start_paths.values(), (where, speed), strict=True)
-            )
-            self._start_values = self._indices({path: list(row) for path, row in paths.items()})
         guesses = memory_start.first_guesses(trials)
         nuisances = [p for p in memory_start.memory_starts(self.plant.model) if p not in free]
         self._memories = self._indices({path: list(guesses) for path in nuisances})
@@ -111,68 +85,54 @@ class SimulatedTrials:
 
         It gets states of shape (tried, rows, states), x0 of shape (tried,) and their vectors.
         """
-
-        def trials(
-            block: list[int], spaces: list[Array], zeros: Array, vectors: Array
-        ) -> list[Array]:
-            logs = [self._trials[i] for i in block]
-            numbers = sum(space.shape[0] * space.shape[1] for space in spaces) / len(spaces)
-            if self.threads == 1 or numbers < WORTH_A_THREAD:
-                return list(map(work, logs, spaces, zeros, repeat(vectors)))
-            with ThreadPoolExecutor(self.threads) as pool:
-                return list(pool.map(work, logs, spaces, zeros, repeat(vectors)))
-
-        return self._by_block(tried, trials)
-
-    def _by_block(
-        self, tried: Array, work: Callable[[list[int], list[Array], Array, Array], list[Array]]
-    ) -> list[Array]:
-        """As `_each`, but `work` gets several trials at once, by their numbers."""
-        vectors = np.repeat(self.plant.vector[None, :], len(tried), axis=0)
+        count = len(tried)
+        vectors = np.repeat(self.plant.vector[None, :], count, axis=0)
         for column, parameter in enumerate(self.free):
             vectors[:, parameter.place] = tried[:, column] * self.factors[column]
-        moved = self._moved_starts()
-        count, number = len(tried) + len(moved), len(self.plant.states)
-        every = self._every(np.concatenate([vectors, *([vectors[:1]] * len(moved))]))
-        for further, indices in enumerate(moved, len(tried)):
-            for place, move in indices:
-                every[further::count, place] += move
-        tables = self._tables(every, count)
+        moved = bool(self._memories)
+        every = self._every(np.concatenate([vectors, vectors[:moved]]))
+        for place, _ in self._memories:
+            every[count :: count + 1, place] += memory_start.MOVE
+        tables = self._tables(every, count + moved)
         first = np.array([logged.first for logged in self._trials])
-        commands = np.repeat(first, count, axis=0).T
+        commands = np.repeat(first, count + moved, axis=0).T
         states, zeros = solver.equilibria_at(self.plant, commands[0], commands[1], every)
         results: list[Array] = []
-        shape = (len(self._trials), count)
+        shape, number = (len(self._trials), count + moved), len(self.plant.states)
         finite = np.isfinite(zeros) & np.isfinite(states).all(axis=1)
         self._settled = bool(finite.all())
         self.balanced = np.asarray(finite.reshape(shape).all(axis=0))
         if not self._settled:
             return results
         states, zeros = states.reshape(*shape, number), zeros.reshape(shape)
-        for block in self._blocks(8 * number * count):
-            spaces = self._spaces(block, count)
+        for block in self._blocks(8 * number * shape[1]):
+            spaces = self._spaces(block, shape[1])
             batches = [
                 self._batch(i, tables[i], states[i], zeros[i], space)
                 for i, space in zip(block, spaces, strict=True)
             ]
             self.attempts += simulate_batches(self.plant.program, batches, self.threads)
-            if self._start_values:
-                spaces = self._met_freely(block, spaces, zeros, vectors, every, tables)
-            elif moved:
+            if moved:
                 each = zip(block, spaces, strict=True)
                 spaces = [self._met(i, space, zeros[i], vectors) for i, space in each]
-            results += work(block, spaces, zeros[block, : len(tried)], vectors)
+            results += self._worked(block, spaces, zeros[block, :count], vectors, work)
         return results
 
-    def _moved_starts(self) -> list[list[tuple[int, float]]]:
-        """Parameters that say how trials begin, moved in one more simulation each, and by how much.
-
-        A position whose zero is free begins anywhere.
-        """
-        if self._start_values:
-            free = self.plant.model.rig.signals[0].has_free_zero
-            return [[(place, initial_states.MOVE)] for place, _ in self._start_values[free:]]
-        return [[(place, memory_start.MOVE) for place, _ in self._memories]] * bool(self._memories)
+    def _worked(
+        self,
+        block: list[int],
+        spaces: list[Array],
+        zeros: Array,
+        vectors: Array,
+        work: Callable[[Logged, Array, Array, Array], Array],
+    ) -> list[Array]:
+        """What `work` makes of the trials of a block, by threads where it is worth them."""
+        logs = [self._trials[i] for i in block]
+        numbers = sum(space.shape[0] * space.shape[1] for space in spaces) / len(spaces)
+        if self.threads == 1 or numbers < WORTH_A_THREAD:
+            return list(map(work, logs, spaces, zeros, repeat(vectors)))
+        with ThreadPoolExecutor(self.threads) as pool:
+            return list(pool.map(work, logs, spaces, zeros, repeat(vectors)))
 
     def _met(self, number: int, space: Array, zeros: Array, vectors: Array) -> Array:
         """States of a trial that begins as fits best, shape (tried, rows, states).
@@ -195,88 +155,7 @@ class SimulatedTrials:
 
     def _in_noise(self, logged: Logged, left: Array) -> Array:
         """Differences (SI), (tried, signals, rows), in units of noise, (tried, numbers)."""
-        return (left / self.deviations[:, None]).reshape(len(left), -1)
-
-    def _met_freely(
-        self,
-        block: list[int],
-        spaces: list[Array],
-        zeros: Array,
-        vectors: Array,
-        every: Array,
-        tables: Sequence[Array],
-    ) -> list[Array]:
-        """States of a free rig's trials, begun as fits best; shape (tried, rows, states) each.
-
-        Args:
-            block: the trials.
-            spaces: their states, with other starts in the last ones.
-            zeros: x0 in each simulation of every trial.
-            vectors: parameters that were tried.
-            every: parameters of every trial in each simulation, its start among them.
-            tables: of every trial.
-        """
-        count, tried, levels = zeros.shape[1], len(vectors), self.deviations
-        further = count - tried
-        last = np.concatenate([vectors, *([vectors[:1]] * further)])
-        logs = [self._trials[i] for i in block]
-        readings = [
-            self._held(space, zeros[i], last, logged.channels)
-            for i, logged, space in zip(block, logs, spaces, strict=True)
-        ]
-        corrections = initial_states.meet(spaces, readings, logs, levels, further)
-        for i, space, correction in zip(block, spaces, corrections, strict=True):
-            if correction.rough:
-                of = slice(i * count, (i + 1) * count)
-                self._begun_again(i, space, zeros[i], last, every[of], tables[i], correction)
-        position = self.plant.model.rig.signals[0]
-        if position.has_free_zero and f"{SENSOR_DELAY}{position.name}" in self._ports:
-            for logged, space in zip(logs, spaces, strict=True):
-                column = self.plant.sensor_columns[0]
-                initial_states.put_zero(space[:tried, :, column], logged)
-        return [space[:tried] for space in spaces]
-
-    def _begun_again(
-        self,
-        number: int,
-        space: Array,
-        zeros: Array,
-        last: Array,
-        every: Array,
-        tables: Array,
-        met: initial_states.Correction,
-    ) -> None:
-        """Begin a trial again from where it was corrected to, until its equations hardly bend.
-
-        Args:
-            number: of the trial.
-            space: its states, with other starts in the last ones; changed in place.
-            zeros: x0 of each.
-            last: parameters of each simulation, less what the trial has of its own.
-            every: those with it.
-            tables: of each simulation.
-            met: the first correction.
-        """
-        logged, further = self._trials[number], len(met.moves)
-        tried = len(space) - further
-        for _ in range(initial_states.RESTARTS):
-            before = space[:tried].copy()
-            for (place, _), move in zip(
-                self._start_values[-further:], met.moves.tolist(), strict=True
-            ):
-                every[:, place] += initial_states.MOVE * move
-            first = np.repeat([logged.first], len(space), axis=0).T
-            states, zeros[:] = solver.equilibria_at(self.plant, first[0], first[1], every)
-            batch = self._batch(number, tables, states, zeros, space)
-            self.attempts += simulate_batches(self.plant.program, [batch], self.threads)
-            readings, least = self._held(space, zeros, last, logged.channels), met.misfit
-            (met,) = initial_states.meet([space], [readings], [logged], self.deviations, further)
-            if not met.misfit < least:
-                # Where dry friction sticks, no move of the start tells what the next one does.
-                space[:tried] = before
-                return
-            if not met.rough:
-                return
+        raise NotImplementedError
 
     def _batch(
         self, number: int, tables: Array, states: Array, zeros: Array, space: Array
@@ -287,12 +166,12 @@ class SimulatedTrials:
             np.ascontiguousarray(column, float)
             for column in (logged.time, logged.motor, logged.regulator)
         )
-        return Batch(time, motor, regulator, self.interpolation, tables, states, zeros, space)
+        return Batch(time, motor, regulator, "foh", tables, states, zeros, space)
 
     def _every(self, vectors: Array) -> Array:
         """Parameters of every trial at each of some, shape (trials * tried, numbers)."""
         every = np.tile(vectors, (len(self._trials), 1))
-        for place, values in (*self._start_values, *self._memories, *self._own):
+        for place, values in (*self._memories, *self._own):
             every[:, place] = np.repeat(values, len(vectors))
         return every
 
@@ -339,14 +218,12 @@ class SimulatedTrials:
             states: shape (tried, rows, states), contiguous.
             zeros: x0 of each.
             vectors: parameters of each, contiguous.
-            read: which signals are asked for, all if not given; the others are zeros.
+            read: which signals are asked for; all if not given.
         """
         columns, program = self.plant.sensor_columns, self.plant.program
-        asked = range(len(columns)) if read is None else read
         count, rows, _ = states.shape
-        truth = np.empty((0, 0, 0))
-        if min([columns[at] for at in asked]) < 0:
-            truth = np.empty((count, rows, len(self.plant.outputs)))
+        truth = np.zeros((count, rows, len(columns)))
+        if min(columns if read is None else [columns[at] for at in read]) < 0:
             here, there, of = (each.ctypes.data for each in (states, truth, vectors))
             for i, zero in enumerate(zeros.tolist()):
                 program.observe(
@@ -356,9 +233,4 @@ class SimulatedTrials:
                     of + i * vectors.strides[0],
                     there + i * truth.strides[0],
                 )
-        unread = truth if len(asked) == len(columns) else np.zeros((count, rows))
-        readings = [unread] * len(columns)
-        for signal in asked:
-            at = columns[signal]
-            readings[signal] = states[:, :, at] if at >= 0 else truth[:, :, signal]
-        return readings
+        return [states[:, :, at] if at >= 0 else truth[:, :, k] for k, at in enumerate(columns)]

@@ -6,7 +6,7 @@ import numpy as np
 
 from pma_gym.data.trial import Trial
 from pma_gym.discovery.fitting.fit_problem import FitProblem
-from pma_gym.discovery.fitting.free_parameters import free_parameters
+from pma_gym.discovery.fitting.free_parameters import FreeParameters, free_parameters
 from pma_gym.discovery.preparation.noise import white_noise
 from pma_gym.discovery.workflow import diagnose
 from pma_gym.plant import sensors
@@ -88,6 +88,13 @@ def diagnosed(case, number=3, rate=64.0, seed=3):
 def fit_problem(trials, model=STATION):
     """What fits share, with the noise that the sensors have."""
     return FitProblem(trials, model, free_parameters(model), tuple(map(white_noise, LEVELS)))
+
+
+def fitted(model, trials, free, threads=1):
+    """A fit of some parameters alone, of which nothing is assumed, with the sensors' noise."""
+    own = FreeParameters(tuple(free), np.full(len(free), np.inf))
+    noise = tuple(map(white_noise, sensors.deviations(model)))
+    return FitProblem(trials, model, own, noise, threads).fit(model)
 
 
 def only(trial, *names):

@@ -13,7 +13,6 @@ from pma_gym import Plant
 from pma_gym.data.trial import Trial
 from pma_gym.discovery import diagnose
 from pma_gym.effects import CATALOGUE
-from pma_gym.estimation.residuals import Residuals
 from pma_gym.plant.model import Model
 
 INERTIA, DAMPING, NOISE_DEG = 0.0049, 0.02, 0.02
@@ -64,15 +63,6 @@ def logs(hidden="", count=3, seconds=4.0, rate=200.0):
     return trials
 
 
-def test_a_trial_begins_where_and_as_fast_as_all_its_readings_say():
-    (trial, _) = logs(count=1, seconds=1.0)
-    residuals = Residuals(joint(), [trial], [])
-    left = residuals.each(residuals.start)[0][:, 0]
-    # The first readings alone would leave an error of their own noise, at every row.
-    assert float(np.mean(left**2)) == pytest.approx(1.0, abs=0.25)
-    assert abs(float(np.mean(left))) < 1e-3
-
-
 def test_a_negative_first_command_is_a_torque_like_any_other():
     time = np.linspace(0.0, 0.1, 11)
     held = Plant(joint()).simulate(Trial(time, {"torque_command": np.full(11, -1.0)}), noise=False)
@@ -95,20 +85,6 @@ def test_a_joint_that_hides_nothing_has_no_effect_named():
     assert diagnosis.verdict in ("parameters", "agrees", "undecidable") and not diagnosis.effects
     moved = diagnosis.parameters["inertia.inertia_kg_m2"]
     assert moved.now.value == pytest.approx(INERTIA, rel=2e-3)
-
-
-def test_a_log_of_speed_alone_begins_as_fast_as_its_readings_say():
-    time = np.arange(0.0, 1.0, 5e-3)
-    tables = {"joint_friction": TABLES["joint_friction"]}
-    speedy = joint(**tables).replace({"joint_start.spin_deg_per_s": 200.0})
-    asked = Trial(time, {"torque_command": 0.1 * np.sin(9.0 * time)})
-    exact = Plant(speedy).simulate(asked, noise=False).measurements["speed"]
-    noisy = exact + 0.02 * np.random.default_rng(1).standard_normal(time.size)
-    table = {"bandwidth_hz": 2000.0, "noise_rad_per_s": 0.02}
-    model = joint(**tables, gyroscope=table)
-    residuals = Residuals(model, [Trial(time, asked.commands, {"speed": noisy})], [])
-    left = residuals.each(residuals.start)[0][:, 1]
-    assert float(np.mean(left**2)) == pytest.approx(1.0, abs=0.3)
 
 
 DELAY_S, BEFORE_S = 7e-3, 0.2

@@ -20,7 +20,6 @@ from benchmarks.runner.journal import case_rows
 from benchmarks.suites.frozen import parse_suite
 from benchmarks.training.preset import load_preset
 from controllers.policies.document import parsed_document
-from controllers.policies.tensors import check_header
 from pma_gym.data.datasets.dataset_toml import read_description
 from pma_gym.documents import parse_json, parse_toml, parse_yaml
 from pma_gym.plant.model import ModelError, dump_model, load_model, shipped_models
@@ -210,7 +209,6 @@ PRESETS = contents("benchmarks/training/presets/*/*.yml")
 PRESET_TABLES = [yaml.safe_load(content) for content in PRESETS]
 POLICIES = contents("controllers/policies/shipped/*.json")
 POLICY_TABLES = [json.loads(content) for content in POLICIES]
-WEIGHTS = [content[:4096] for content in contents("controllers/policies/shipped/*.safetensors")]
 DATASETS = [
     {
         "title": "Bench",
@@ -282,12 +280,6 @@ def test_bytes(name, data):
 def test_bytes_of_models(tmp_path_factory, content):
     path = _file(tmp_path_factory, "model.toml", content)
     accepts(load_model, path, error=ModelError)
-
-
-@fuzzed
-@given(damaged(WEIGHTS), st.integers(0, 1 << 40))
-def test_headers_of_weights(content, size):
-    accepts(check_header, content, size)
 
 
 @fuzzed

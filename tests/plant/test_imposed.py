@@ -7,7 +7,6 @@ from pma_gym import Plant
 from pma_gym.data.files.trial_files import read_trial
 from pma_gym.data.trial import Trial, TrialError
 from pma_gym.effects import CATALOGUE
-from pma_gym.estimation.fitting import fit
 from pma_gym.plant.imposed_motion import smoothed
 from pma_gym.plant.model import Model, load_model
 
@@ -162,24 +161,6 @@ def test_too_few_rows_for_a_bandwidth_are_refused_with_one_that_fits():
 def test_a_log_without_a_motion_is_refused_with_its_column():
     with pytest.raises(TrialError, match="give contraction_command_mm"):
         Plant(imposed()).simulate(Trial(TIME, {"pressure_command": 0.0 * TIME}))
-
-
-def test_a_fit_gives_back_what_a_seal_does():
-    true = imposed(
-        contact_friction=FRICTION,
-        contractile_force={"slope_n_per_kpa": 0.49, "intercept_n": 3.0},
-        force_sensor={"bandwidth_hz": 1000.0, "noise_n": 0.2},
-    )
-    measured = [Plant(true).simulate(trial(0.02, p), seed=1) for p in (100e3, 300e3)]
-    off = {
-        "contact_friction.force_n": 6.0,
-        "contractile_force.slope_n_per_kpa": 0.3,
-        "contractile_force.intercept_n": 0.0,
-    }
-    values = fit(true.replace(off), measured, list(off)).values
-    assert values["contact_friction.force_n"] == pytest.approx(10.0, rel=0.01)
-    assert values["contractile_force.slope_n_per_kpa"] == pytest.approx(0.49, rel=0.005)
-    assert values["contractile_force.intercept_n"] == pytest.approx(3.0, abs=0.2)
 
 
 def test_friction_rises_near_rest():

@@ -9,8 +9,6 @@ from pma_gym.data.files.trial_files import read_trial
 from pma_gym.data.trial import Trial, TrialError
 from pma_gym.effects import CATALOGUE
 from pma_gym.envs import PMAEnv
-from pma_gym.estimation.fitting import fit
-from pma_gym.estimation.residuals import Residuals
 from pma_gym.plant.model import Model
 
 INERTIA = 0.0049
@@ -121,42 +119,3 @@ def test_files_hold_radians_too(tmp_path):
     path = tmp_path / "run.csv"
     path.write_text("time_s,torque_command_n_m,angle_rad\n0,0,0.5\n0.1,0,0.6\n", "utf-8")
     np.testing.assert_array_equal(read_trial(path).measurements["angle"], [0.5, 0.6])
-
-
-def test_a_fit_gives_back_what_moved_a_joint_that_started_anywhere():
-    tables = {
-        "joint_weight": {"moment_n_m": 0.48, "offset_deg": 0.0},
-        "joint_damping": {"coefficient_n_m_s": 0.01},
-        "encoder": {"bandwidth_hz": 1000.0, "noise_deg": 0.05},
-    }
-    time = np.linspace(0.0, 2.0, 401)
-    torque = 0.1 * np.sin(5.0 * time + 2.0 * time**2)
-    measured = [
-        Plant(joint(True, start, **tables)).simulate(
-            Trial(time, {"torque_command": torque}), seed=1
-        )
-        for start in (20.0, -70.0)
-    ]
-    off = {"joint_weight.moment_n_m": 0.4, "joint_damping.coefficient_n_m_s": 0.02}
-    made = fit(joint(True, **tables).replace(off), measured, list(off))
-    values = made.values
-    assert values["joint_weight.moment_n_m"] == pytest.approx(0.48, rel=2e-3)
-    assert values["joint_damping.coefficient_n_m_s"] == pytest.approx(0.01, rel=0.02)
-
-
-@pytest.mark.parametrize(("start", "spin"), [(80.0, 300.0), (100.0, 100.0), (-90.0, -400.0)])
-def test_a_start_that_the_first_readings_tell_badly_is_corrected_where_the_equations_bend(
-    start, spin
-):
-    """What is left is a tenth of a noise of 0.001 deg; one correction along a line leaves 17."""
-    tables = {
-        "joint_weight": {"moment_n_m": 0.48, "offset_deg": 0.0},
-        "joint_damping": {"coefficient_n_m_s": 0.02},
-        "encoder": {"bandwidth_hz": 5000.0, "noise_deg": 1e-3},
-    }
-    time = np.arange(0.0, 1.0, 0.002)
-    torque = {"torque_command": 0.6 * np.sin(20.0 * time)}
-    begun = joint(True, start, **tables).replace({"joint_start.spin_deg_per_s": spin})
-    trial = Plant(begun).simulate(Trial(time, torque), noise=False)
-    (left,) = Residuals(joint(True, **tables), [trial], []).each(np.empty(0))
-    assert np.abs(left[:, 0]).max() < 0.2

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from pma_gym.data.files.even_clock import even_clock, joined
 from pma_gym.data.files.trial_formats import ENCODERS
 from pma_gym.data.files.trial_hints import looks_like, mapping_line
-from pma_gym.data.files.trial_loading import load_table
+from pma_gym.data.files.trial_loading import known_suffix, load_table
 from pma_gym.data.files.trial_values import TrialWarning, check_units, file_values, warn
 from pma_gym.data.readers.table import FileFormat, Table, UnreadableError, decimal_mark, shown
 from pma_gym.data.trial import Trial
@@ -132,7 +132,7 @@ def check_writable(path: str | os.PathLike[str]) -> None:
     """
     path = as_path(path, TrialError)
     if not path.is_dir():
-        _written_suffix(path)
+        known_suffix(path, ENCODERS)
     try:
         check_output(path)
     except OutputError as error:
@@ -186,18 +186,7 @@ def encode_trial(trial: Trial, path: str | os.PathLike[str]) -> bytes:
         for column in COLUMNS
         if column.quantity in signals
     }
-    return ENCODERS[_written_suffix(Path(path))](columns, trial.provenance)
-
-
-def _written_suffix(path: Path) -> str:
-    """The suffix in lower case, if trials are written in that format."""
-    suffix = path.suffix.lower()
-    if suffix not in ENCODERS:
-        raise TrialError(
-            f"{path.name} must end in {', '.join(ENCODERS)}, got {path.suffix or 'no suffix'!r}; "
-            "save it in one of these formats"
-        )
-    return suffix
+    return ENCODERS[known_suffix(Path(path), ENCODERS)](columns, trial.provenance)
 
 
 def _match(table: Table, mapping: ColumnMap) -> list[Source]:

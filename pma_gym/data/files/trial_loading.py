@@ -1,7 +1,7 @@
 """A trial's table from its file: which reader, which part, which rows."""
 
 import os
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 from itertools import compress
 from pathlib import Path
@@ -27,16 +27,16 @@ _NEEDED = "a trial needs a header with time_s and a command, and a row for each 
 _SHOWN = 5
 
 
-def known_suffix(path: Path) -> str:
+def known_suffix(path: Path, known: Collection[str] = DECODERS) -> str:
     """The suffix in lower case.
 
     Raises:
-        TrialError: there is no reader for it.
+        TrialError: it is not among the known ones.
     """
     suffix = path.suffix.lower()
-    if suffix not in DECODERS:
+    if suffix not in known:
         raise TrialError(
-            f"{path.name} must end in {', '.join(DECODERS)}, got {path.suffix or 'no suffix'!r}; "
+            f"{path.name} must end in {', '.join(known)}, got {path.suffix or 'no suffix'!r}; "
             "save it in one of these formats"
         )
     return suffix

@@ -1,4 +1,8 @@
-"""Everything that a diagnosis says, from what its steps found."""
+"""Everything that a diagnosis says, from what its steps found.
+
+The model that it proposes, the fit that it comes from, and which experiment to do: one that tells
+survivors apart, or shows what could not be seen.
+"""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -7,14 +11,12 @@ import numpy as np
 
 from pma_gym.data.trial_columns import BY_QUANTITY
 from pma_gym.discovery.answer.candidate_list import candidate_list
-from pma_gym.discovery.answer.estimates import selected_effects
-from pma_gym.discovery.answer.experiment_choice import proposed_experiment
+from pma_gym.discovery.answer.estimates import selected_effects, value_and_error
 from pma_gym.discovery.answer.own_parameters import (
     moved_parameters,
     not_identifiable,
     parameters_off,
 )
-from pma_gym.discovery.answer.proposed_model import amended_model, proposal
 from pma_gym.discovery.answer.reader_warnings import approximate_law_warnings, reader_warnings
 from pma_gym.discovery.answer.trial_records import (
     floors_in_file_units,
@@ -23,16 +25,22 @@ from pma_gym.discovery.answer.trial_records import (
     trial_records,
 )
 from pma_gym.discovery.diagnosis import Diagnosis, Verdict
+from pma_gym.discovery.experiments.detectability import experiment_to_detect
+from pma_gym.discovery.experiments.next_experiment import next_experiment
+from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
+from pma_gym.discovery.fitting.fit_problem import FitProblem, Fitted
 from pma_gym.discovery.fitting.trial_states import misfits, trial_states
 from pma_gym.discovery.preparation.quantisation import coarse_sensors
 from pma_gym.discovery.report.noise_text import nuisances
 from pma_gym.discovery.report.verdict_text import sentence, steps
 from pma_gym.discovery.result.estimates import Approximate, Moved, NamedEffect
 from pma_gym.discovery.result.misfit import ResidualLaw, TrialRecord
+from pma_gym.discovery.result.next_experiment import NextExperiment
 from pma_gym.discovery.screening.localisation import localise
 from pma_gym.discovery.screening.residuals import residuals
+from pma_gym.discovery.selection.backward_elimination import as_given
 from pma_gym.discovery.verdict.approximate import MOST_SCATTER, closing
-from pma_gym.discovery.verdict.decision import verdict_of
+from pma_gym.discovery.verdict.decision import suspicious, verdict_of
 from pma_gym.discovery.verdict.findings import Findings
 from pma_gym.discovery.verdict.residual_fraction import ResidualFraction, residual_fraction, tones
 from pma_gym.discovery.verdict.residual_laws import residual_law
@@ -46,6 +54,92 @@ from pma_gym.discovery.verdict.unknown import (
 )
 from pma_gym.discovery.verdict.worsened import worsened
 from pma_gym.effects import CATALOGUE
+from pma_gym.plant.model import Model
+from pma_gym.plant.parameter_rows import Note
+
+
+def proposal(
+    findings: Findings, verdict: Verdict
+) -> tuple[FitProblem, Fitted, tuple[CandidateEffect, ...]]:
+    """The fit of the model that is proposed, on which bench, with which effects."""
+    if verdict == "agrees":
+        given = as_given(findings.problem)
+        return given.problem, given.fit, ()
+    if findings.elimination is not None:
+        return findings.elimination.problem, findings.elimination.fit, ()
+    if verdict in ("effect", "unknown"):
+        return findings.selection.problem, findings.selection.fit, findings.selection.chosen
+    return findings.problem, findings.refitted, ()
+
+
+def amended_model(findings: Findings, verdict: Verdict) -> Model:
+    """The model with what was found, its intervals in its notes."""
+    fit = proposal(findings, verdict)[1]
+    if not fit.paths:
+        return findings.given
+    notes = dict(fit.model.notes)
+    for path in fit.paths:
+        value, error = value_and_error(findings, fit, path)
+        known = bool(np.isfinite(error))
+        notes[path] = Note(
+            f"fitted to {len(findings.named)} trials by pma_gym.discovery",
+            value - 1.96 * error if known else None,
+            value + 1.96 * error if known else None,
+        )
+    for path in findings.selection.undetermined if verdict in ("effect", "unknown") else ():
+        notes[path] = Note("not determined by the trials: held where its law is at a limit")
+    return replace(
+        fit.model,
+        name=f"{findings.given.name}amended_model",
+        title=f"{findings.given.title}; amended by a diagnosis",
+        notes=notes,
+    )
+
+
+SILENT = 0.2
+"""Share of the catalogue that would not have shown, from which on an experiment that would show it
+is proposed although nothing seems to be missing."""
+
+
+def proposed_experiment(
+    findings: Findings, verdict: Verdict, not_detectable: Sequence[str]
+) -> NextExperiment | None:
+    """What to measure next: what tells the survivors apart, or shows what could not be seen."""
+    problem, selection = findings.selection.problem, findings.selection
+    for place, rivals in enumerate(findings.rivals):
+        equal = [rival for rival in rivals if rival.equal][:3]
+        if equal:
+            others = [
+                (
+                    rival.fit,
+                    tuple(
+                        rival.candidate if i == place else candidate
+                        for i, candidate in enumerate(selection.chosen)
+                    ),
+                )
+                for rival in equal
+            ]
+            return next_experiment(
+                problem, [(selection.fit, selection.chosen), *others], findings.seed
+            )
+    if verdict == "undecidable" and selection.chosen:
+        # Not borne out by trials left out: is it there, or nothing? Both beside the same noise.
+        plain = problem.fit(findings.refitted.model) or findings.refitted
+        pair = [(selection.fit, selection.chosen), (plain, ())]
+        following = next_experiment(problem, pair, findings.seed)
+        if following is not None:
+            return following
+    silent = verdict in ("parameters", "agrees") and len(not_detectable) > SILENT * len(
+        findings.candidates
+    )
+    if (verdict == "undecidable" or silent) and findings.scores:
+        worth = [
+            score.candidate
+            for score in (findings.scores[:3] if suspicious(findings) else findings.scores)
+        ]
+        return experiment_to_detect(findings.problem, findings.refitted, worth, findings.scores)
+    return None
+
 
 Progress = Callable[[str, int, int], None]
 

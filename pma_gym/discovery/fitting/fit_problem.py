@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 from pma_gym.data.trial import Trial
 from pma_gym.discovery.fitting.candidate_effect import CandidateEffect, within_turn
 from pma_gym.discovery.fitting.free_parameters import FreeParameters, values
+from pma_gym.discovery.fitting.levenberg_marquardt import LevenbergMarquardt
 from pma_gym.discovery.preparation.assumed_range import LEAST_GAIN, MOST_DOUBLINGS
 from pma_gym.discovery.preparation.noise import Whitening
 from pma_gym.discovery.preparation.whitened_residuals import WhitenedResiduals
-from pma_gym.estimation.fitting import LevenbergMarquardt
 from pma_gym.estimation.least_squares import inverse
 from pma_gym.plant.model import Model
 
@@ -248,21 +248,10 @@ class FitProblem:
         """
         if not self.far(fit):
             return fit
-        refit = self.eased_fit(fit.model, extra, self.left(fit))
-        return min(filter(None, (fit, refit)), key=_chi_square)
-
-    def eased_fit(
-        self, model: Model, extra: Sequence[CandidateEffect], left: float
-    ) -> Fitted | None:
-        """Fit a model to noise as large as a residual, then to ever less noise.
-
-        Args:
-            model: where its own parameters begin.
-            extra: the candidates in it.
-            left: rms of the residual, in standard deviations of the noise.
-        """
+        left = self.left(fit)
         ever_less = [left / EASIER**k for k in range(int(np.log(left) / np.log(EASIER)) + 1)]
-        return self.fit(self._eased(model, extra, ever_less), extra)
+        refit = self.fit(self._eased(fit.model, extra, ever_less), extra)
+        return min(filter(None, (fit, refit)), key=_chi_square)
 
     def _eased(
         self, model: Model, extra: Sequence[CandidateEffect], larger: Sequence[float]
@@ -312,10 +301,10 @@ class FitProblem:
         if reach:
             whitened = self.whitened_residuals(model, extra, trials, reach)
         try:
-            search = LevenbergMarquardt(whitened, False, 1.0)
+            search = LevenbergMarquardt(whitened)
         except ValueError:
             return None
-        converged = search.run(None, ROUNDS)
+        converged = search.run(ROUNDS)
         for _ in range(MOST_DOUBLINGS if self.widens else 0):
             edges = whitened.at_assumed_edge(search.values)
             if not edges:
@@ -323,11 +312,11 @@ class FitProblem:
             wider = reach | {path: 2.0 * reach.get(path, 1.0) for path in edges}
             whitened = self.whitened_residuals(_at(model, search), extra, trials, wider)
             try:
-                further = LevenbergMarquardt(whitened, False, 1.0)
+                further = LevenbergMarquardt(whitened)
             except ValueError:
                 # At the end of what it balances: a rounded number may lie beyond.
                 break
-            ended = further.run(None, ROUNDS)
+            ended = further.run(ROUNDS)
             if not further.best.chi_square < search.best.chi_square - LEAST_GAIN:
                 break
             search, converged, reach = further, ended, wider

@@ -23,9 +23,7 @@ from pma_gym.discovery.preparation.assumed_range import (
 from pma_gym.discovery.preparation.noise import Whitening
 from pma_gym.discovery.preparation.nuisance_projection import Projection, projection
 from pma_gym.estimation.logged import Logged
-from pma_gym.estimation.residuals import Residuals, Sums
-from pma_gym.integrator.equations import Interpolation
-from pma_gym.plant.compiled_model import DEFAULT_TOLERANCE
+from pma_gym.estimation.simulated_trials import SimulatedTrials
 from pma_gym.plant.model import Model
 
 Array = NDArray[np.float64]
@@ -65,7 +63,22 @@ class Pieces:
         return int(self.counts[np.isin(self.trial, trials)].sum())
 
 
-class WhitenedResiduals(Residuals):
+@dataclass(frozen=True)
+class Sums:
+    """Sums over the residuals r of all trials, in units of the noise; J = dr / d(parameters).
+
+    Attributes:
+        chi_square: r.r; infinite if the model cannot be simulated.
+        gradient: J^T r, shape (p,), per file unit.
+        curvature: J^T J, shape (p, p).
+    """
+
+    chi_square: float
+    gradient: Array
+    curvature: Array
+
+
+class WhitenedResiduals(SimulatedTrials):
     """Trials beside a model with free parameters, whitened; what a search may lower.
 
     Args:
@@ -77,7 +90,7 @@ class WhitenedResiduals(Residuals):
             for one that may be anything.
         centre: what they are expected to be; the model's own values if not given.
         own: values (SI) that a parameter has in each trial, by path.
-        tolerance, interpolation, threads: as `Residuals`.
+        threads: as `SimulatedTrials`.
         reach: how many times as wide as assumed beforehand the range of a parameter is, by path.
         lowest: least values (file unit) of parameters that the trials can show, by path.
         highest: largest values, likewise.
@@ -95,14 +108,12 @@ class WhitenedResiduals(Residuals):
         prior: Array,
         centre: Array | None = None,
         own: Mapping[str, Sequence[float]] | None = None,
-        tolerance: float = DEFAULT_TOLERANCE,
-        interpolation: Interpolation = "foh",
         threads: int = 1,
         reach: Mapping[str, float] | None = None,
         lowest: Mapping[str, float] | None = None,
         highest: Mapping[str, float] | None = None,
     ) -> None:
-        super().__init__(model, trials, free, tolerance, interpolation, threads)
+        super().__init__(model, trials, free, threads)
         self.noise, self.prior = tuple(noise), np.asarray(prior, float)
         self.centre = self.start.copy() if centre is None else np.asarray(centre, float)
         least = np.array([(lowest or {}).get(path, -np.inf) for path in free])
@@ -131,9 +142,9 @@ class WhitenedResiduals(Residuals):
         pairs = zip(self.free, wider.tolist(), strict=True)
         return {free.path: reach for free, reach in pairs if reach > 1.0}
 
-    def sums(self, values: Array, steps: Array, central: bool = False) -> Sums:
+    def sums(self, values: Array, steps: Array) -> Sums:
         """Sums over whitened residuals, with what the prior adds."""
-        moved_products = self._moved_products(values, steps, central, self._product)
+        moved_products = self._moved_products(values, steps, False, self._product)
         total = np.sum(moved_products, axis=0) if moved_products else np.full((1, 1), np.nan)
         if not np.isfinite(total).all():
             size = len(steps)
@@ -168,10 +179,31 @@ class WhitenedResiduals(Residuals):
             differences = self._differences(logged, states, zeros, vectors, central)
             # A rig that cannot be simulated has no finite products; who asks for them looks.
             with np.errstate(invalid="ignore", over="ignore"):
-                white = self.whitened(logged, differences[:, :, : len(logged.time)])
+                white = self.whitened(logged, differences)
                 return products(logged, white / widths[:, None, None])
 
         return self._each(tried, work)
+
+    def _differences(
+        self, logged: Logged, states: Array, zeros: Array, vectors: Array, central: bool
+    ) -> Array:
+        """Simulated minus measured, then what moving each parameter changes (SI).
+
+        Shape (1 + p, signals, rows).
+        """
+        readings = self._held(states, zeros, vectors, logged.channels)
+        moved = (len(states) - 1) // 2 if central else len(states) - 1
+        differences = np.zeros((1 + moved, *logged.measured.shape))
+        for channel in logged.channels:
+            signal, there = readings[channel], differences[:, channel]
+            np.subtract(signal[0], logged.measured[channel], out=there[0])
+            if central:
+                np.subtract(signal[1 : 1 + moved], signal[1 + moved :], out=there[1:])
+                there[1:] *= 0.5
+            else:
+                np.subtract(signal[1:], signal[0], out=there[1:])
+            there[:, logged.missing[channel]] = 0.0
+        return differences
 
     def columns(self, tried: Array) -> list[Any] | None:
         """Whitened residual at the first of some parameters, and what the others change.
@@ -182,7 +214,7 @@ class WhitenedResiduals(Residuals):
 
         def work(logged: Logged, states: Array, zeros: Array, vectors: Array) -> Any:  # noqa: ANN401
             differences = self._differences(logged, states, zeros, vectors, central=False)
-            return self.whitened(logged, differences[:, :, : len(logged.time)]).astype(np.float32)
+            return self.whitened(logged, differences).astype(np.float32)
 
         columns = self._each(tried, work)
         if not self._settled or not all(np.isfinite(part).all() for part in columns):

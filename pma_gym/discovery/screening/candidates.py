@@ -125,7 +125,7 @@ def _lacking(
         for stem, quantity in quantities.items()
         if (stem not in effect.held or quantity.neutral is not None)
         and stem not in effect.rows
-        # Free in every trial already, as `estimation.residuals` has it.
+        # Free in every trial already, as `estimation.simulated_trials` has it.
         and stem not in ("repeat", effect.memory_start)
     }
     if any(quantity.usual is None for quantity in shown.values()):

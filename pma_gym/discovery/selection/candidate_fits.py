@@ -15,7 +15,6 @@ from pma_gym.discovery.screening.scanned_range import ScannedRange, scanned_rang
 from pma_gym.discovery.screening.score_test import ScreeningScore
 from pma_gym.discovery.screening.starting_points import starting_points
 from pma_gym.discovery.selection.kept_fits import kept_form, restored
-from pma_gym.discovery.selection.rugged_fits import best_of_optima, is_rugged
 from pma_gym.effects import CATALOGUE
 from pma_gym.plant.model import Model
 
@@ -38,10 +37,6 @@ LIKELY = 0.25
 
 LEAST_FITTED = 0.35
 """The same, below which a candidate counts as one that could not be fitted."""
-
-MOST_LEFT = 0.1
-"""Share of chi-square that an effect leaves at most where it carries most of a misfit: a third of
-the residual."""
 
 MUCH, MOST_OF = 1.05, 0.8
 """Noises left from which on another effect counts that carries this share of what is left beyond
@@ -273,7 +268,6 @@ def better(
     problem: FitProblem,
     fit: Fitted,
     chosen: tuple[CandidateEffect, ...],
-    before: Fitted,
     journal: Journal,
 ) -> Fitted:
     """A fit, or a better one from a careful search: what it misses would look like an effect.
@@ -282,19 +276,13 @@ def better(
         problem: the trials.
         fit: the fit.
         chosen: the effects in it.
-        before: without the last effect.
         journal: keeps fits.
     """
 
     def search() -> Fitted:
         refit = problem.careful_fit(fit.model.replace(_given(problem)), chosen)
         best = fit if refit is None or refit.chi_square >= fit.chi_square else refit
-        best = problem.continuation(best, chosen)
-        if not is_rugged(best, chosen):
-            return best
-        # Where most of the misfit is left another effect is looked for first.
-        carries = best.chi_square < MOST_LEFT * before.chi_square
-        return best_of_optima(problem, best, chosen, refines=carries)
+        return problem.continuation(best, chosen)
 
     return _once("better", problem, fit, chosen, journal, search)
 

@@ -2,19 +2,28 @@
 
 In each round (`stages`) every candidate is scored; what passes the gate is fitted together with the
 model's parameters; the likeliest is added; then the same again beside it. Each effect is then left
-out once, and stays out if the fit is as good without it, or is exchanged for another that explains
-more beside the rest. Where nothing passes any more, further terms of the laws that were added are
-fitted (`further_terms`). The noise is estimated again only when all effects are selected: before,
-an autoregression would take the next effect for noise.
+out once, and stays out if the fit is as good without it. Where nothing passes any more, further
+terms of the laws that were added are fitted (`further_terms`). The noise is estimated again only
+when all effects are selected: before, an autoregression would take the next effect for noise.
+
+A further term of a law (a seal rubs without pressure too) changes little beside the first, too
+little to be looked for by itself. Left out it makes the first one's size wrong by as much as both
+have in common.
+
+Another effect may stand in place of a term: a friction that falls with speed, or a quadratic drag.
+A law with a further term explains some of what an effect beside it would, and the look beside the
+whole law sees nothing left. So where the search ends, looks are taken beside the law without its
+term too.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 
 from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
 from pma_gym.discovery.fitting.covariance import covariance
 from pma_gym.discovery.fitting.fit_problem import FitProblem, Fitted
+from pma_gym.discovery.fitting.held_out import is_asked_for
 from pma_gym.discovery.fitting.journal import Journal
 from pma_gym.discovery.result.estimates import Undetermined
 from pma_gym.discovery.screening.residuals import reestimated_noise
@@ -23,16 +32,88 @@ from pma_gym.discovery.selection.candidate_fits import (
     better,
     carries_the_rest,
     cost,
+    fitted,
     refit,
     without_idle,
 )
-from pma_gym.discovery.selection.exchanged_effects import exchanged
-from pma_gym.discovery.selection.further_terms import further_terms
-from pma_gym.discovery.selection.instead_of_terms import instead_of_term
-from pma_gym.discovery.selection.rugged_fits import is_rugged, settled
 from pma_gym.discovery.selection.scanned_parameters import with_scanned
-from pma_gym.discovery.selection.stages import Stage, stage_of
-from pma_gym.discovery.selection.tried_candidates import Progress
+from pma_gym.discovery.selection.stages import Progress, Stage, stage_of
+from pma_gym.discovery.selection.tied_laws import Chosen, Nested, fit_tied, simpler_laws
+from pma_gym.effects import CATALOGUE
+
+
+def instead_of_term(
+    problem: FitProblem,
+    fit: Fitted,
+    chosen: Chosen,
+    rest: Sequence[CandidateEffect],
+    seed: int,
+    journal: Journal,
+    progress: Progress,
+    is_worth: Callable[[Stage, float], bool],
+) -> tuple[Stage, Chosen, Fitted] | None:
+    """An effect that explains more beside a law without its term than the term does.
+
+    Args:
+        problem: the trials.
+        fit: the fit of the effects.
+        chosen: the effects.
+        rest: the other candidates.
+        seed: of simulated residuals.
+        journal: keeps fits.
+        progress: called with a step's name, what is done and the total.
+        is_worth: whether an effect is worth adding in a round, by what it brings of chi-square.
+    Returns:
+        The round beside the law without its term, the effects and their fit; None where no effect
+        has a term, or nothing that is worth it explains more.
+    """
+    state, least, best = Nested(chosen, fit, {}), cost(fit), None
+    known = {candidate.name: candidate for candidate in rest}
+    for place, candidate in enumerate(chosen):
+        for tie in simpler_laws(candidate):
+            simpler = None if tie.twin else fit_tied(problem, state, place, tie)
+            if simpler is None:
+                continue
+            stage = stage_of(problem, simpler.fit, simpler.chosen, rest, seed, journal, progress)
+            for name, other in stage.fits.items():
+                gain = stage.before.chi_square - other.chi_square
+                if cost(other) < least and is_worth(stage, gain):
+                    least, best = cost(other), (stage, known[name], other)
+    if best is None:
+        return None
+    stage, new, other = best
+    # The term may still be there beside it: nested laws ask that.
+    whole = problem.fit(other.model, (*chosen, new))
+    return None if whole is None else (stage, (*chosen, new), whole)
+
+
+def further_terms(
+    problem: FitProblem, best: Fitted, chosen: Chosen, stage: Stage, journal: Journal
+) -> Mapping[str, Fitted]:
+    """Fits of terms that explain more than their parameters cost, of readings left out too.
+
+    Args:
+        problem: the trials.
+        best: the fit of the effects.
+        chosen: the effects.
+        stage: the round of the other candidates beside them.
+        journal: keeps fits.
+    """
+    terms = {}
+    for score in stage.scores:
+        new = score.candidate
+        law = CATALOGUE[new.effect]
+        if not any(law.is_further_term(CATALOGUE[each.effect]) for each in chosen):
+            continue
+        fit = stage.fits.get(new.name)
+        if fit is None:
+            fit = fitted(problem, stage.baseline, best, chosen, score, journal)
+        if fit is None or best.chi_square - fit.chi_square < LEAST_GAIN or cost(fit) > cost(best):
+            continue
+        if is_asked_for(problem, (fit, (*chosen, new)), (best, chosen)):
+            terms[new.name] = fit
+    return terms
+
 
 SECOND_SHARE, SURE_SHARE = 0.12, 0.02
 """Least share of the first effect's gain that another must bring: what a law of the catalogue
@@ -86,12 +167,10 @@ def select(
         progress: called with a step's name, what is done and the total.
     """
     added = _with_added(problem, refitted, candidates, seed, journal, progress)
-    chosen, best = exchanged(problem, added.fit, added.chosen, added.stages, candidates)
+    chosen, best = added.chosen, added.fit
     problem = replace(problem, noise=reestimated_noise(problem, best, chosen))
     fit = refit(problem, best, chosen, journal)
     chosen, fit = with_scanned(problem, fit, chosen, journal, ends_rigid=True)
-    if is_rugged(fit, chosen):
-        fit = settled(problem, replace(fit, spread=best.spread), chosen)
     fit = replace(fit, covariance=covariance(problem, fit, chosen))
     return replace(added, chosen=chosen, fit=fit, problem=problem)
 
@@ -122,9 +201,8 @@ def _with_added(
             if other is not None:
                 stages[-1], chosen, best = other
             break
-        new = next(each for each in candidates if each.name == added)
-        chosen = (*chosen, stage.scanned.get(added, new))
-        best = better(problem, stage.fits[added], chosen, stage.before, journal)
+        chosen = (*chosen, next(each for each in candidates if each.name == added))
+        best = better(problem, stage.fits[added], chosen, journal)
         chosen, best = with_scanned(problem, best, chosen, journal)
         chosen, best = without_idle(problem, best, chosen, refitted, journal)
         if not chosen and best.chi_square < refitted.chi_square and anew < BEGINNINGS:

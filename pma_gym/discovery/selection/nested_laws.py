@@ -27,7 +27,6 @@ from pma_gym.discovery.fitting.held_out import is_asked_for
 from pma_gym.discovery.result.estimates import Undetermined
 from pma_gym.discovery.selection.candidate_fits import cost
 from pma_gym.discovery.selection.profile_limits import limits
-from pma_gym.discovery.selection.rugged_fits import begun_above
 from pma_gym.discovery.selection.tied_laws import (
     Chosen,
     Nested,
@@ -37,6 +36,7 @@ from pma_gym.discovery.selection.tied_laws import (
     fit_tied,
     simpler_laws,
 )
+from pma_gym.discovery.selection.whole_laws import begun_above
 
 FLAT = 4.0
 """Chi-square by which a profile may rise and still be flat: twice a log-likelihood of 2."""

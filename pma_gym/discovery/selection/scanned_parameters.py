@@ -11,15 +11,13 @@ other parameters by their errors: a share of friction was 6.0 % at 0.02 um, 6.2 
 rigid end of the ladder is tried at last, and stays unless the rung explains more than chance.
 """
 
-from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from pma_gym.discovery.fitting.candidate_effect import CandidateEffect, bounds
 from pma_gym.discovery.fitting.fit_problem import FitProblem, Fitted
 from pma_gym.discovery.fitting.free_parameters import values
 from pma_gym.discovery.fitting.journal import Journal
-from pma_gym.discovery.screening.score_test import ScreeningScore
-from pma_gym.discovery.selection.candidate_fits import COST, cost, refit
+from pma_gym.discovery.selection.candidate_fits import COST, refit
 from pma_gym.effects import CATALOGUE
 
 LADDER = (10.0, 10.0**0.5)
@@ -40,9 +38,6 @@ RIGID_STEPS = 10.0
 """Most steps from one reading to the next at the rigid end. A contact that sticks takes more there:
 it swings on its bristles."""
 
-FAR_NEARER = 4.0
-"""How many times less chi-square must be far from the trials: a residual half as large."""
-
 Chosen = tuple[CandidateEffect, ...]
 
 
@@ -51,7 +46,6 @@ def with_scanned(
     fit: Fitted,
     chosen: Chosen,
     journal: Journal,
-    last: bool = False,
     ends_rigid: bool = False,
 ) -> tuple[Chosen, Fitted]:
     """The effects and their fit, with scanned parameters at the best of their ladders.
@@ -61,11 +55,10 @@ def with_scanned(
         fit: the fit of the effects.
         chosen: the effects in it.
         journal: keeps fits.
-        last: whether only those of the last effect are scanned.
         ends_rigid: whether the rigid end is tried at last: of a fit that no effect is added to any
             more, for far from the trials it leads to other minima.
     """
-    for name in [candidate.name for candidate in chosen[-1 if last else 0 :]]:
+    for name in [candidate.name for candidate in chosen]:
         candidate = next(each for each in chosen if each.name == name)
         for path in _scanned(candidate):
             for step in LADDER:
@@ -74,32 +67,6 @@ def with_scanned(
             if ends_rigid and not problem.far(fit):
                 chosen, fit = _rigid(problem, fit, chosen, name, path, journal)
     return chosen, fit
-
-
-def likeliest_scanned(
-    problem: FitProblem,
-    chosen: Chosen,
-    scores: Sequence[ScreeningScore],
-    fits: Mapping[str, Fitted],
-    journal: Journal,
-) -> dict[str, tuple[CandidateEffect, Fitted]]:
-    """The likeliest candidate at the best of its ladders, where no fit comes near the trials.
-
-    It counts where the ladders bring it far nearer: what less brings may be another minimum.
-
-    Args:
-        problem: the trials.
-        chosen: the effects that candidates were fitted beside.
-        scores: of the candidates.
-        fits: of candidates, by name.
-        journal: keeps fits.
-    """
-    known = {each.candidate.name: each.candidate for each in scores}
-    name = min(fits, key=lambda each: cost(fits[each]), default=None)
-    if name not in known or not _scanned(known[name]) or not all(map(problem.far, fits.values())):
-        return {}
-    beside, fit = with_scanned(problem, fits[name], (*chosen, known[name]), journal, last=True)
-    return {name: (beside[-1], fit)} if FAR_NEARER * fit.chi_square < fits[name].chi_square else {}
 
 
 def _scanned(candidate: CandidateEffect) -> list[str]:

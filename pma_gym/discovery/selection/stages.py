@@ -6,8 +6,8 @@ data sets. It opens too where the residual itself is no noise: where it is many 
 are too large for noise (`scan_statistic`) and an effect explains them.
 """
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 
 from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
 from pma_gym.discovery.fitting.fit_problem import FitProblem, Fitted
@@ -17,8 +17,48 @@ from pma_gym.discovery.screening.residuals import far_off, is_autocorrelated, sc
 from pma_gym.discovery.screening.scan_statistic import NO_EXCESS, ScanStatistic
 from pma_gym.discovery.screening.score_test import ScreeningScore, screen
 from pma_gym.discovery.screening.starting_points import refined_score
-from pma_gym.discovery.selection.candidate_fits import probed
-from pma_gym.discovery.selection.tried_candidates import Progress, Tried, fits_of_candidates
+from pma_gym.discovery.selection.candidate_fits import fitted, probed, restarted, unfitted
+
+TRIED, NEAR = 8, 0.05
+"""How many candidates are fitted at most, and the share of the best look's gain that one needs."""
+
+Progress = Callable[[str, int, int], None]
+
+
+def fits_of_candidates(
+    problem: FitProblem,
+    baseline: Baseline,
+    before: Fitted,
+    chosen: tuple[CandidateEffect, ...],
+    scores: Sequence[ScreeningScore],
+    restarts: bool,
+    journal: Journal,
+    progress: Progress,
+) -> tuple[dict[str, Fitted], tuple[str, ...]]:
+    """Fits of the candidates that may be worth one, by name, and those that could not be fitted.
+
+    Args:
+        problem: the trials.
+        baseline: the model that they are tried beside, ready to be looked beside.
+        before: the same.
+        chosen: the effects in it.
+        scores: of all candidates, the best first.
+        restarts: whether fits that come near no trial are begun again.
+        journal: keeps fits.
+        progress: called with a step's name, what is done and the total.
+    """
+    fits: dict[str, Fitted] = {}
+    worth = [each for each in scores if each.gain > NEAR * scores[0].gain and each.starts]
+    for number, each in enumerate(worth[:TRIED]):
+        progress(f"fitting effect {len(chosen) + 1}", number, len(worth[:TRIED]))
+        refit = fitted(problem, baseline, before, chosen, each, journal)
+        if refit is not None:
+            fits[each.candidate.name] = refit
+    beside, scored = (problem, baseline, before, chosen), dict(fits)
+    if restarts:
+        fits |= restarted(*beside, worth, scored, fits, journal, progress)
+    return fits, unfitted(*beside, worth[:TRIED], fits)
+
 
 ALARM = 0.005
 """Family-wise rate of false alarms that the gate lets through."""
@@ -55,7 +95,6 @@ class Stage:
         scan: pieces of it that opened the gate by themselves.
         unfitted: candidates that could not be fitted: their range, simulated, promises more than
             any fit brings, and their own fits bring far less although a refit keeps the promise.
-        scanned: candidates that were fitted with held parameters at other values, by name.
     """
 
     problem: FitProblem
@@ -67,7 +106,6 @@ class Stage:
     missing: bool
     scan: ScanStatistic = NO_EXCESS
     unfitted: tuple[str, ...] = ()
-    scanned: Mapping[str, CandidateEffect] = field(default_factory=dict)
 
 
 def stage_of(
@@ -108,24 +146,24 @@ def stage_of(
         least = max(CARRIED * scan.excess, _least_change(problem) ** 2 * rows)
         scores = _refined_scores(problem, baseline, before, scores, scan.chance, least)
         gate = tuple(each for each in scores if each.starts)
-    tried = Tried()
+    fits: dict[str, Fitted] = {}
+    unfitted: tuple[str, ...] = ()
     if gate:
         beside = problem, baseline, before, chosen
-        tried = fits_of_candidates(*beside, scores, far, not astray, journal, progress)
-    gains = [before.chi_square - fit.chi_square for fit in tried.fits.values()]
+        fits, unfitted = fits_of_candidates(*beside, scores, not astray, journal, progress)
+    gains = [before.chi_square - fit.chi_square for fit in fits.values()]
     if scan.excess and all(gain < least for gain in gains):
-        gate, tried, scores, scan = (), replace(tried, fits={}), plainly, NO_EXCESS
+        gate, fits, scores, scan = (), {}, plainly, NO_EXCESS
     return Stage(
         shared,
         before,
         baseline,
         tuple(scores),
-        tried.fits,
+        fits,
         gate,
         missing,
         scan,
-        tried.unfitted,
-        tried.scanned,
+        unfitted,
     )
 
 
@@ -134,8 +172,8 @@ def _as_assumed(
 ) -> tuple[FitProblem, Fitted]:
     """Trials and fit within what was assumed of the parameters.
 
-    A motor that is all but locked hides what holds it. Looks and fits begin beside what was assumed
-    of the parameters, and stay there until an effect is added.
+    Parameters far from what was assumed hide what is missing. Looks and fits begin beside what was
+    assumed of them, and stay there until an effect is added.
     """
     held = problem.fit_as_assumed(before, chosen)
     return replace(problem, widens=False), before if held is None else held
