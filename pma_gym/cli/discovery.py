@@ -164,7 +164,12 @@ OutOption = Annotated[
     Path | None, typer.Option(help="Folder for the results; else the data set's name and command.")
 ]
 SeedOption = Annotated[int, typer.Option(min=0, help="Seed of chance.")]
-JobsOption = Annotated[int, typer.Option(min=1, help="How many cores to use.")]
+CORES = os.cpu_count() or 1
+
+JobsOption = Annotated[
+    int,
+    typer.Option(min=1, help="How many cores to use.", show_default="all"),
+]
 ChecksOption = Annotated[
     bool,
     typer.Option(help="Stop where a unit is certainly wrong; else only warn."),
@@ -177,7 +182,7 @@ def diagnose(
     model: ModelOption = None,
     out: OutOption = None,
     seed: SeedOption = 0,
-    jobs: JobsOption = 1,
+    jobs: JobsOption = CORES,
     checks: ChecksOption = True,
     resume: Annotated[
         bool, typer.Option("--resume", help="Go on with a run that was interrupted.")
@@ -233,7 +238,7 @@ def fit(
     model: ModelOption = None,
     out: OutOption = None,
     seed: SeedOption = 0,
-    jobs: JobsOption = 1,
+    jobs: JobsOption = CORES,
     checks: ChecksOption = True,
     force: ForceOption = False,
     as_json: JsonOption = False,

@@ -73,7 +73,7 @@ def diagnose(
         trials: measured trials, or a data set (`pma_gym.data.datasets.dataset.read_dataset`).
         model: the model to compare with; what the data set names, else station.
         seed: of simulated chance.
-        jobs: how many threads simulate; slides and joints take one.
+        jobs: how many threads simulate.
         journal: a folder in which finished fits are kept, from which an interrupted diagnosis goes
             on; None keeps nothing. Slides and joints keep none.
         progress: called with a step's name, what is done of it and its total.
@@ -147,7 +147,9 @@ class _Work:
             _check_size([Logged.of(given, i, trial) for i, trial in enumerate(trials)], own.free)
             said = self._timed(
                 "grey box",
-                lambda: answered(given, named, every, dataset.tolerance, self.seed, self._tell),
+                lambda: answered(
+                    given, named, every, dataset.tolerance, self.seed, self._tell, self.jobs
+                ),
             )
             words = (*(dataset.checked or ()), *words, *said.warnings)
             return replace(said, warnings=words, seconds=dict(self.seconds))

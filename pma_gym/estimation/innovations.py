@@ -1,9 +1,12 @@
 """Innovations of logged trials by a model with a latent force, at many points at once."""
 
 import ctypes
+import os
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from copy import copy
 from dataclasses import dataclass
+from functools import cache
 from typing import Annotated, NamedTuple
 
 import numpy as np
@@ -208,13 +211,15 @@ class Rows:
 
     def commands(self, delay: float) -> Array:
         """Mean command over each step, late by a delay; shape (rows, steps)."""
-        if delay not in self._known:
-            if len(self._known) > MOST_KEPT:
-                self._known.clear()
+        known = self._known.get(delay)
+        if known is None:
             first, last = (self._integral(edge - delay) for edge in (self._from, self._to))
             mean = (last - first) / (self._to - self._from)
-            self._known[delay] = np.concatenate([np.full((1, self.steps), self.first), mean])
-        return self._known[delay]
+            known = np.concatenate([np.full((1, self.steps), self.first), mean])
+            if len(self._known) > MOST_KEPT:
+                self._known.clear()
+            self._known[delay] = known
+        return known
 
     def _integral(self, at: Array) -> Array:
         """Integral of the command up to given times; before the first row it is as there."""
@@ -264,6 +269,12 @@ class Kept:
     transition: Array
 
 
+@cache
+def _pool(threads: int, process: int) -> ThreadPoolExecutor:
+    """Threads of this process: those of its parent do not come with it."""
+    return ThreadPoolExecutor(threads)
+
+
 class GreyBox:
     """A model's filter over trials.
 
@@ -271,9 +282,13 @@ class GreyBox:
         model: the model.
         rows: the trials.
         channels: signals that are read.
+        threads: that run at once, over trials and parameter vectors; the bits are the same.
     """
 
-    def __init__(self, model: Model, rows: Sequence[Rows], channels: Sequence[int]) -> None:
+    def __init__(
+        self, model: Model, rows: Sequence[Rows], channels: Sequence[int], threads: int = 1
+    ) -> None:
+        self.threads = threads
         self.model, self.rows, self.channels = model, list(rows), tuple(channels)
         self.kernel = kernel(model, channels)
         self.order: Array = np.arange(float(len(rows))) - 0.5 * (len(rows) - 1)
@@ -286,16 +301,22 @@ class GreyBox:
         self, points: Sequence[Point], rows: Sequence[Rows] | None = None
     ) -> list[tuple[Array, Array]]:
         """Innovations and their variances of each trial, shape (points, rows, signals) each."""
-        width, results = self.kernel.width, []
-        for number, trial in enumerate(rows or self.rows):
-            shape = (len(points), len(trial.time), len(self.channels))
-            errors, spreads = np.empty(shape), np.empty(shape)
-            for first in range(0, len(points), width):
-                some = list(points[first : first + width])
-                out = self._run(self.kernel, number, trial, some + [some[-1]] * (width - len(some)))
-                errors[first : first + width] = np.moveaxis(out[:, :, 0, : len(some)], -1, 0)
-                spreads[first : first + width] = np.moveaxis(out[:, :, 1, : len(some)], -1, 0)
-            results.append((errors, spreads))
+        width, trials = self.kernel.width, list(rows or self.rows)
+        results = [
+            (np.empty(shape), np.empty(shape))
+            for shape in [(len(points), len(t.time), len(self.channels)) for t in trials]
+        ]
+
+        def part(number: int, first: int) -> None:
+            some = list(points[first : first + width])
+            filled = some + [some[-1]] * (width - len(some))
+            out = self._run(self.kernel, number, trials[number], filled)
+            for i, into in enumerate(results[number]):
+                into[first : first + width] = np.moveaxis(out[:, :, i, : len(some)], -1, 0)
+
+        parts = [(n, first) for n in range(len(trials)) for first in range(0, len(points), width)]
+        work = _pool(self.threads, os.getpid()).map if self.threads > 1 else map
+        list(work(part, *zip(*parts, strict=True)))
         return results
 
     def kept(self, number: int, point: Point) -> Kept:

@@ -94,6 +94,7 @@ def answered(
     tolerance: Mapping[str, float],
     seed: int,
     tell: Callable[[str, int, int], None],
+    threads: int = 1,
 ) -> Diagnosis:
     """The diagnosis of a free rig.
 
@@ -104,11 +105,14 @@ def answered(
         tolerance: misfit that is good enough (SI), by measurement.
         seed: of the starts of fits.
         tell: called with a step's name, what is done of it and its total.
+        threads: that filters run in at once.
     Raises:
         TrialError: trials with fewer readings than a fit needs.
     """
     logged = [Logged.of(model, i, each.trial) for i, each in enumerate(named)]
-    selection = EffectSelection(model, logged, candidates or (), seed=seed, tell=tell)
+    selection = EffectSelection(
+        model, logged, candidates or (), seed=seed, tell=tell, threads=threads
+    )
     path = [selection.base()] if candidates is None else selection.run()
     tell("putting the answer together", 0, 1)
     limits = {

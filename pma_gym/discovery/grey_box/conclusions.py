@@ -123,7 +123,7 @@ class Conclusions:
             ]
             for i in left:
                 rows[i].there = np.zeros_like(rows[i].there)
-            box = GreyBox(each.box.model, rows, each.box.channels)
+            box = GreyBox(each.box.model, rows, each.box.channels, each.box.threads)
             made = fit(box, each.fit.point, each.fit.coordinates, each.fit.tied)
             forces = {f"force {i}": value_of(each.fit.point, f"force {i}") for i in left}
             curves = predictions(each.box, with_values(made.point, forces), self.horizon)
@@ -360,7 +360,11 @@ class Conclusions:
             if stem in model.effects[effect].rows or TREND in stem or TRIAL in stem or "[" in stem:
                 continue
             if value != getattr(model.parameters[effect], stem):
-                changes[path_of(name)] = CATALOGUE[effect].quantities[stem].from_si(value)
+                quantity = CATALOGUE[effect].quantities[stem]
+                # A bound in SI and back may be a bit beyond itself.
+                changes[path_of(name)] = float(
+                    np.clip(quantity.from_si(value), quantity.lower, quantity.upper)
+                )
         return model.replace(changes)
 
     def estimate(self, name: str) -> Estimate:

@@ -173,6 +173,7 @@ class EffectSelection:
         linear: whether commands are linear between rows; None: what is likelier.
         seed: of the starts.
         tell: called with what is being done, what is done of it and its total.
+        threads: that filters run in at once.
     """
 
     def __init__(
@@ -183,7 +184,9 @@ class EffectSelection:
         linear: bool | None = None,
         seed: int = 0,
         tell: Callable[[str, int, int], None] = lambda step, done, total: None,
+        threads: int = 1,
     ) -> None:
+        self.threads = threads
         self.model, self.logged, self.seed, self.tell = model, list(logged), seed, tell
         self.linear = linear
         self.channels = [
@@ -248,7 +251,7 @@ class EffectSelection:
                 for one in self.logged
             ]
             self._rows[steps, linear] = each
-        return GreyBox(model, self._rows[steps, linear], self.channels)
+        return GreyBox(model, self._rows[steps, linear], self.channels, self.threads)
 
     def _force(self) -> float:
         """Force of the drive (N, N m) at the root mean square of its command."""
@@ -512,7 +515,7 @@ class EffectSelection:
         ]
 
     def tried(self, now: Hypothesis, move: Move, careful: bool = False) -> Hypothesis:
-        """Fit with a move added; `careful` from more starts."""
+        """Fit with a move added; `careful` from further starts."""
         candidate = move.candidate
         if candidate is None:
             return self._varied(now, move, careful)
@@ -543,7 +546,7 @@ class EffectSelection:
         whole = replace(here, numbers={**box.numbers(), **here.numbers})
         best = None
         starts = ((1.0, 0.5, 1.0), (0.5, 0.5, 10.0)) if law.scanned else ((1.0, 0.5, 1.0),)
-        for part, share, wide in (*starts, *(CAREFUL if careful else ())):
+        for part, share, wide in CAREFUL if careful else starts:
             values = dict(at)
             for c in more:
                 if c.name in absent:
@@ -794,7 +797,8 @@ class EffectSelection:
             tried = self._extended(beam, f"effect {stage + 1}")
             if not tried or self._lead(tried[0], best) < 0.0:
                 break
-            for at, chain in enumerate(tried[:2]):
+            bent = self._is_bent(tried[0][-1], MATERIAL)
+            for at, chain in enumerate(tried[: 2 if bent else 1]):
                 *before, last = chain
                 again = self.tried(before[-1], last.moves[-1], careful=True)
                 if again.fit.value > last.fit.value:
