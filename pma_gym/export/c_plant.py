@@ -192,7 +192,7 @@ class CPlant:
 
 def template(name: str) -> Template:
     """A C text with places for names and statements."""
-    return Template((resources.files(__package__) / "templates" / name).read_text())
+    return Template((resources.files(__name__.rpartition(".")[0]) / "templates" / name).read_text())
 
 
 def _at_rest(model: Model) -> tuple[float, float]:

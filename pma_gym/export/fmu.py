@@ -85,15 +85,10 @@ def _xml(root: Element) -> bytes:
 
 
 def _description(plant: CPlant, version: int, token: str, sources: Sequence[str]) -> Element:
-    root = Element(
-        "fmiModelDescription",
-        fmiVersion=f"{version}.0",
-        modelName=plant.model.name,
-        description=plant.model.title,
-        version=__version__,
-        generationTool=f"pma-gym {__version__}",
-        **{"instantiationToken" if version == 3 else "guid": token},
-    )
+    head = {"fmiVersion": f"{version}.0", "modelName": plant.model.name}
+    head |= {"description": plant.model.title, "generationTool": f"pma-gym {__version__}"}
+    head["instantiationToken" if version == 3 else "guid"] = token
+    root = Element("fmiModelDescription", head)
     identity = {"modelIdentifier": plant.name, "canHandleVariableCommunicationStepSize": "true"}
     kind = SubElement(root, "CoSimulation", identity)
     variables = list(_variables(plant))
