@@ -11,7 +11,6 @@ from controllers.models.voltage import VOLTAGE_LIMIT, nominal_offset
 from controllers.pid import pid_law
 from controllers.policies.network import Weights
 from controllers.policies.policy_file import PolicyFile
-from pma_gym import __version__
 from pma_gym.codegen.elementary import clip
 from pma_gym.codegen.graph import CHANGING, Graph
 from pma_gym.codegen.text import c_text
@@ -110,7 +109,7 @@ def _layers(weights: Weights) -> list[str]:
 
 
 def _source(kind: str, name: str, words: dict[str, str]) -> list[bytes]:
-    common = {"name": identifier(name), "version": __version__, **words}
-    folder = resources.files(__package__) / "templates"
+    common = {"name": identifier(name), **words}
+    folder = resources.files(__name__.rpartition(".")[0]) / "templates"
     texts = (Template((folder / f"{kind}.{end}").read_text()) for end in ("h", "c"))
     return [text.substitute(common).encode() for text in texts]

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from importlib import resources
 from string import Template
 
-from pma_gym import __version__
 from pma_gym.codegen.graph import CHANGING, FIXED, HELD, Value
 from pma_gym.codegen.text import C_PREAMBLE, c_text
 from pma_gym.codegen.trace import live_inputs, substitute
@@ -141,7 +140,7 @@ class CPlant:
             slope = f"slope[{i}]" if i < len(self.commands) else "0.0"
             places[graph.input(f"{name}_slope", HELD)] = slope
         inputs = {value.id: place for value, place in places.items()}
-        common = {"name": self.name, "command": str(self.command), "version": __version__}
+        common = {"name": self.name, "command": str(self.command)}
         header = template("plant.h").substitute(
             common,
             title=self.model.title.replace("*/", "* /"),

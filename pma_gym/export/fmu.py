@@ -11,7 +11,6 @@ from collections.abc import Sequence
 from pathlib import Path
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
-from pma_gym import __version__
 from pma_gym.export.c_plant import CPlant, ExportError, Variable, si_unit, template
 from pma_gym.units import SI_FACTORS
 
@@ -86,7 +85,7 @@ def _xml(root: Element) -> bytes:
 
 def _description(plant: CPlant, version: int, token: str, sources: Sequence[str]) -> Element:
     head = {"fmiVersion": f"{version}.0", "modelName": plant.model.name}
-    head |= {"description": plant.model.title, "generationTool": f"pma-gym {__version__}"}
+    head |= {"description": plant.model.title, "generationTool": "pma-gym"}
     head["instantiationToken" if version == 3 else "guid"] = token
     root = Element("fmiModelDescription", head)
     identity = {"modelIdentifier": plant.name, "canHandleVariableCommunicationStepSize": "true"}

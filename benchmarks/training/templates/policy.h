@@ -1,4 +1,4 @@
-/* $title, exported by pma-gym $version.
+/* $title, exported by pma-gym.
  *
  * Entries of the observation, and what 1.0 stands for; all are held in -1 to 1:
 $observation

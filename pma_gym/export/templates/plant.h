@@ -1,6 +1,6 @@
 /* $title
  *
- * The plant of the model "$model", exported by pma-gym $version. SI throughout.
+ * The plant of the model "$model", exported by pma-gym. SI throughout.
  *
  * Integrator: that of pma_gym's Plant.simulate, exponential Rosenbrock steps of adaptive size, held
  * to parameter[0] of the states' scales. Steps end where the motion turns (stick and slip), where a
