@@ -58,17 +58,12 @@ WORDS: dict[str, Callable[[Parameters], Words]] = {
 }
 """What an effect is in MuJoCo, by its name: amounts (SI), which are added."""
 
-PARTS: dict[str, tuple[Callable[[Parameters], Parameters], str]] = {
-    **dict.fromkeys(
-        ("coulomb_friction", "joint_friction"),
-        (lambda p: p._replace(static=p.dynamic), "no rise of dry friction at rest (Stribeck)"),
-    ),
-    **dict.fromkeys(
-        ("drive_lag", "drive_delay"),
-        (lambda p: p._replace(share=float(p.share > 0.0)), "no lag or delay of a share"),
-    ),
+PARTS: dict[str, tuple[Words, str]] = {
+    "coulomb_friction": ({"presliding": 1e-8}, "presliding, or a rise at rest (Stribeck)"),
+    "joint_friction": ({"presliding": 1e-9}, "presliding, or a rise at rest (Stribeck)"),
+    **dict.fromkeys(("drive_lag", "drive_delay"), ({"share": 1.0}, "a share that is not late")),
 }
-"""Effects that are there in part: parameters of what is, and what is not."""
+"""Effects that are there in part: what MuJoCo's amounts to (SI), and what it lacks."""
 
 
 @dataclass(frozen=True)
@@ -90,16 +85,18 @@ def lost_effects(model: Model) -> Iterator[Lost]:
     """Effects of a model that MuJoCo cannot carry, or not all of."""
     for name, p in model.parameters.items():
         effect, kept = model.effects[name], dict(model.parameters)
-        if name in PARTS:
-            in_part, reason = PARTS[name]
-            kept[name] = in_part(p)
-        elif name in WORDS or p == effect.neutral:
+        if p == effect.neutral or (name in WORDS and name not in PARTS):
             continue
+        if name in PARTS:
+            changes, reason = PARTS[name]
+            kept[name] = p._replace(
+                **changes, **({"static": p.dynamic} if "friction" in name else {})
+            )
         else:
             del kept[name]
-            reason = "no such law of a joint or actuator"
+            reason = "such a law of a joint or an actuator"
             if effect.port.startswith("sensor"):
-                reason = "no sensor that is late or wrong"
+                reason = "a sensor that is late or wrong"
         if kept.get(name) != p:
             yield Lost(name, reason, replace(model, parameters=kept))
 
@@ -239,32 +236,38 @@ def run(text: str, time: np.ndarray, command: np.ndarray) -> np.ndarray:
     return np.stack(columns, axis=1)
 
 
-def replay(model: Model, trials: Sequence[Trial]) -> dict[str, np.ndarray]:
-    """Differences of trials from the model's own simulation, in standard deviations of the sensors.
+def replay(runs: Sequence[tuple[Model, Trial]]) -> dict[str, np.ndarray]:
+    """Compare MuJoCo with the model's own simulation, in standard deviations of its sensors.
 
     Args:
-        model: a slide or joint.
-        trials: their commands are what counts.
+        runs: a slide or joint, with the start of a trial, and the trial, whose commands count.
     Returns:
-        By what is compared: root mean square over all rows of position and speed, shape (2,).
-        "MuJoCo" is the true motion in MuJoCo; "MuJoCo, without what it cannot carry" the same
-        against the model without those effects; the others, by effect, what the sensors read with
-        and without it.
+        Root mean square of the difference over all rows, of position and speed, shape (2,), by what
+        is compared. `IN_MUJOCO`: the true motion. `THE_REST`: the same without what MuJoCo cannot
+        carry. By effect that it cannot carry: what the sensors read with and without it.
     """
-    lost = list(lost_effects(model))
-    plants = [Plant(model), Plant(carried(model)), *(Plant(each.without) for each in lost)]
-    names = ["MuJoCo", "MuJoCo, without what it cannot carry", *(each.effect for each in lost)]
-    noise, text = deviations(model), mjcf(model)
-    squares, rows = np.zeros((len(names), 2)), 0
-    for trial in trials:
-        ours = [plant.simulate(trial, noise=False) for plant in plants]
-        theirs = run(text, trial.time, voltages(model, trial)[0])
-        pairs = [(theirs, _columns(each.truth, model)) for each in ours[:2]]
-        read = [_columns(each.measurements, model) for each in ours]
-        pairs += [(each, read[0]) for each in read[2:]]
-        squares += [np.sum(((a - b) / noise) ** 2, axis=0) for a, b in pairs]
-        rows += len(trial)
-    return dict(zip(names, np.sqrt(squares / rows), strict=True))
+    squares: dict[str, np.ndarray] = {}
+    for model, trial in runs:
+        noise = deviations(model)
+        theirs = run(mjcf(model), trial.time, voltages(model, trial)[0])
+        whole = Plant(model).simulate(trial, noise=False)
+        rest = Plant(carried(model), EXACT).simulate(trial, noise=False)
+        off = {IN_MUJOCO: theirs - _columns(whole.truth, model)}
+        off[THE_REST] = theirs - _columns(rest.truth, model)
+        read = _columns(whole.measurements, model)
+        for lost in lost_effects(model):
+            without = Plant(lost.without).simulate(trial, noise=False)
+            off[lost.effect] = read - _columns(without.measurements, model)
+        for name, each in off.items():
+            squares[name] = squares.get(name, 0.0) + np.sum((each / noise) ** 2, axis=0)
+    rows = sum(len(trial) for _, trial in runs)
+    return {name: np.sqrt(square / rows) for name, square in squares.items()}
+
+
+EXACT = 1e-7
+"""Tolerance of the model without what MuJoCo cannot carry, whose dry friction turns at once."""
+
+IN_MUJOCO, THE_REST = "MuJoCo", "MuJoCo, without what it cannot carry"
 
 
 def _columns(values: Mapping[str, np.ndarray], model: Model) -> np.ndarray:
