@@ -7,6 +7,7 @@ Runge-Kutta; friction loss is as hard as MuJoCo has it.
 """
 
 import math
+from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import ModuleType
@@ -16,7 +17,8 @@ from xml.sax.saxutils import escape, quoteattr
 import numpy as np
 
 from pma_gym.data.trial import Trial
-from pma_gym.effects.effect import Parameters
+from pma_gym.effects.effect import Effect, Parameters
+from pma_gym.effects.ports import measured_output
 from pma_gym.export.c_plant import ExportError, template
 from pma_gym.plant.model import Model
 from pma_gym.plant.plant import Plant
@@ -58,12 +60,15 @@ WORDS: dict[str, Callable[[Parameters], Words]] = {
 }
 """What an effect is in MuJoCo, by its name: amounts (SI), which are added."""
 
-PARTS: dict[str, tuple[Words, str]] = {
-    "coulomb_friction": ({"presliding": 1e-8}, "presliding, or a rise at rest (Stribeck)"),
-    "joint_friction": ({"presliding": 1e-9}, "presliding, or a rise at rest (Stribeck)"),
-    **dict.fromkeys(("drive_lag", "drive_delay"), ({"share": 1.0}, "a share that is not late")),
+_FRICTION = "its rise at rest (Stribeck) and what moves before it slips (presliding)"
+
+PARTS: dict[str, tuple[Callable[[Parameters], Parameters], str]] = {
+    "coulomb_friction": (lambda p: p._replace(static=p.dynamic, presliding=1e-8), _FRICTION),
+    "joint_friction": (lambda p: p._replace(static=p.dynamic, presliding=1e-9), _FRICTION),
+    "drive_lag": (lambda p: p._replace(share=1.0), "the share that is not late"),
+    "drive_delay": (lambda p: p._replace(share=1.0), "the share that is not late"),
 }
-"""Effects that are there in part: what MuJoCo's amounts to (SI), and what it lacks."""
+"""Effects that are there in part: parameters (SI) of what MuJoCo has, and what it lacks."""
 
 
 @dataclass(frozen=True)
@@ -85,29 +90,43 @@ def lost_effects(model: Model) -> Iterator[Lost]:
     """Effects of a model that MuJoCo cannot carry, or not all of."""
     for name, p in model.parameters.items():
         effect, kept = model.effects[name], dict(model.parameters)
-        if p == effect.neutral or (name in WORDS and name not in PARTS):
+        if _is_absent(effect, p) or (name in WORDS and name not in PARTS):
             continue
         if name in PARTS:
-            changes, reason = PARTS[name]
-            kept[name] = p._replace(
-                **changes, **({"static": p.dynamic} if "friction" in name else {})
-            )
+            in_part, reason = PARTS[name]
+            kept[name] = in_part(p)
+        elif effect.port.startswith("sensor"):
+            reason = "a sensor that is late or wrong"
+            # No sensor has errors without its own table.
+            gone = [name] if effect.law else _of_sensor(model, effect)
+            kept = {name: p for name, p in kept.items() if name not in gone}
         else:
-            del kept[name]
             reason = "such a law of a joint or an actuator"
-            if effect.port.startswith("sensor"):
-                reason = "a sensor that is late or wrong"
+            del kept[name]
         if kept.get(name) != p:
             yield Lost(name, reason, replace(model, parameters=kept))
 
 
+def _is_absent(effect: Effect, p: Parameters) -> bool:
+    """Whether a law is exactly absent."""
+    neutral = {n: q.to_si(q.neutral) for n, q in effect.quantities.items() if q.neutral is not None}
+    switches = neutral.items() if effect.law else ()
+    return bool(switches) and all(getattr(p, name) == value for name, value in switches)
+
+
+def _of_sensor(model: Model, sensor: Effect) -> list[str]:
+    """Names of a sensor and of all that is between it and the truth."""
+    output = measured_output(sensor.port)
+    return [name for name, each in model.effects.items() if measured_output(each.port) == output]
+
+
 def carried(model: Model) -> Model:
     """The model without what MuJoCo cannot carry."""
+    kept = dict(model.parameters)
     for lost in lost_effects(model):
-        kept = lost.without.parameters.get(lost.effect)
-        rest = {name: p for name, p in model.parameters.items() if name != lost.effect}
-        model = replace(model, parameters=rest if kept is None else rest | {lost.effect: kept})
-    return model
+        left = lost.without.parameters
+        kept = {n: left[n] if n == lost.effect else p for n, p in kept.items() if n in left}
+    return replace(model, parameters=kept)
 
 
 def mjcf(model: Model) -> str:
@@ -123,14 +142,10 @@ def mjcf(model: Model) -> str:
             f"--to mjcf takes a slide or a joint, model {model.name} is of a {model.plant}; take "
             "--to fmu or --to c"
         )
-    amounts = dict.fromkeys(
-        ("damping", "drag", "friction", "stiffness", "rest", "cubic", "moment", "lowest_point")
-        + ("constant", "highest", "lag", "delay"),
-        0.0,
-    )
-    for name, p in model.parameters.items():
-        for word, amount in WORDS.get(name, lambda _: {})(p).items():
-            amounts[word] = amounts.get(word, 0.0) + amount
+    amounts: defaultdict[str, float] = defaultdict(float)
+    for name in filter(WORDS.__contains__, model.parameters):
+        for word, amount in WORDS[name](model.parameters[name]).items():
+            amounts[word] += amount
     lost = [f"{each.effect}: {each.reason}" for each in lost_effects(model)]
     position, speed = model.rig.signals
     noise = deviations(model)
