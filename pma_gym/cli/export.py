@@ -26,7 +26,9 @@ def export(
     model: Annotated[
         str, typer.Argument(help="Shipped name or TOML file.", autocompletion=model_names)
     ],
-    to: Annotated[Target, typer.Option(help="C99, an FMU, or MuJoCo (slides and joints).")],
+    to: Annotated[
+        Target, typer.Option(help="C99, an FMU, or MuJoCo (slides and joints).")
+    ] = Target.C,
     out: Annotated[Path, typer.Option(help="Folder of what is written.")] = Path("."),
     start: Annotated[
         str,

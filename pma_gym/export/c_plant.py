@@ -98,8 +98,8 @@ class CPlant:
         plant = self.plant = Plant(model)
         self._system = plant.program.first_order_hold
         self._eq, made = self._system.equations, self._system.attempt
-        at_rest = _at_rest(model)[: len(names)]
-        begin = (*commands, *at_rest[len(commands) :])
+        usual = _without_force(model)[: len(names)]
+        begin = [float(each) for each in (*commands, *usual[len(commands) :])]
         settled = plant.settle(begin[0], regulator_voltage=[*begin, 0.0][1])
         self.zero = settled.zero_contraction
         known = dict(zip(plant.states, settled.state.tolist(), strict=True))
@@ -194,7 +194,7 @@ def template(name: str) -> Template:
     return Template((resources.files(__name__.rpartition(".")[0]) / "templates" / name).read_text())
 
 
-def _at_rest(model: Model) -> tuple[float, float]:
+def _without_force(model: Model) -> tuple[float, float]:
     """Commands (V, or the SI unit of the drive's command) at which the drive gives no force."""
     two_way = model.parameters.get("two_way_drive")
     return (two_way.middle if two_way else 0.0), 0.0

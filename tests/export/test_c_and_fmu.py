@@ -58,7 +58,7 @@ def agree(got, measured, model):
 def test_c_moves_as_the_plant_does(name, tmp_path):
     model = RIGS[name]()
     trial = trial_of(model)
-    plant = CPlant(model, [float(column[0]) for column in trial.commands.values()])
+    plant = CPlant(model, [column[0] for column in trial.commands.values()])
     texts = {**plant.files(), "main.c": plant.main()}
     for file, text in texts.items():
         (tmp_path / file).write_text(text)
