@@ -44,6 +44,7 @@ def test_a_replay_of_logs_says_the_difference_by_effect(run, model):
         (("station", "--to", "mjcf"), "takes a slide or a joint"),
         (("own.toml", "--start", "1,x"), "--start must be numbers such as 2,5, got '1,x'"),
         (("own.toml", "--start", "1,2"), "must be torque_command, got 2 numbers"),
+        (("own.toml", "--to", "fmu", "--logs", "logs"), "--logs are replayed in MuJoCo"),
         (("own.toml", "--out", "nowhere"), "there is no folder nowhere"),
     ],
 )

@@ -111,5 +111,5 @@ def _layers(weights: Weights) -> list[str]:
 def _source(kind: str, name: str, words: dict[str, str]) -> list[bytes]:
     common = {"name": identifier(name), **words}
     folder = resources.files(__name__.rpartition(".")[0]) / "templates"
-    texts = (Template((folder / f"{kind}.{end}").read_text()) for end in ("h", "c"))
+    texts = (Template((folder / f"{kind}.{end}").read_text("utf-8")) for end in ("h", "c"))
     return [text.substitute(common).encode() for text in texts]

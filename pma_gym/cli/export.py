@@ -49,6 +49,8 @@ def export(
     # Imported here: other commands do without.
     from pma_gym.export.c_plant import CPlant, ExportError, identifier
 
+    if logs and to is not Target.MJCF:
+        raise ExportError(f"--logs are replayed in MuJoCo: give --to mjcf, got --to {to}")
     exported = load_model(model)
     if to is Target.MJCF:
         from pma_gym.export.mjcf import mjcf

@@ -130,16 +130,15 @@ class CPlant:
     def files(self) -> dict[str, str]:
         """The texts of header and source by file name."""
         made = self._system.attempt
-        places: dict[Value, str] = {value: f"p[{i}]" for i, value in enumerate(self._inputs)}
-        places |= {value: f"x[{i}]" for i, value in enumerate(made.before)}
-        places |= {made.size: "plant->size", made.left: "plant->left"}
-        places[self._eq[ZERO]] = "plant->zero_contraction"
         graph = self._eq.graph
-        places[graph.input("jump", CHANGING)] = "jump"
+        inputs = {value.id: f"p[{i}]" for i, value in enumerate(self._inputs)}
+        inputs |= {value.id: f"x[{i}]" for i, value in enumerate(made.before)}
+        inputs |= {made.size.id: "plant->size", made.left.id: "plant->left"}
+        inputs[self._eq[ZERO].id] = "plant->zero_contraction"
+        inputs[graph.input("jump", CHANGING).id] = "jump"
         for i, name in enumerate(COMMANDS):
             slope = f"slope[{i}]" if i < len(self.commands) else "0.0"
-            places[graph.input(f"{name}_slope", HELD)] = slope
-        inputs = {value.id: place for value, place in places.items()}
+            inputs[graph.input(f"{name}_slope", HELD).id] = slope
         common = {"name": self.name, "command": str(self.command)}
         header = template("plant.h").substitute(
             common,
@@ -191,7 +190,8 @@ class CPlant:
 
 def template(name: str) -> Template:
     """A C text with places for names and statements."""
-    return Template((resources.files(__name__.rpartition(".")[0]) / "templates" / name).read_text())
+    folder = resources.files(__name__.rpartition(".")[0]) / "templates"
+    return Template((folder / name).read_text("utf-8"))
 
 
 def _without_force(model: Model) -> tuple[float, float]:

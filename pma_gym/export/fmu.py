@@ -71,7 +71,7 @@ def shared_library(sources: dict[str, str], compiled: Sequence[str]) -> bytes:
         )
     with tempfile.TemporaryDirectory() as folder:
         for name, text in sources.items():
-            Path(folder, name).write_text(text)
+            Path(folder, name).write_text(text, encoding="utf-8")
         out = Path(folder, "library.so")
         command = [compiler, *FLAGS, "-fPIC", "-shared", "-s", "-o", str(out), *compiled, "-lm"]
         subprocess.run(command, cwd=folder, check=True)

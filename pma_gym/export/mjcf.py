@@ -24,8 +24,8 @@ from pma_gym.plant.model import Model
 from pma_gym.plant.plant import Plant
 from pma_gym.plant.sensors import deviations, direct_command, voltages
 
-STEP_S = 2e-4
-"""Step of the exported model (s)."""
+STEP_S = 1e-4
+"""Step of the exported model (s); dry friction turns within some of them, an error of order 1."""
 
 GRAVITY = 9.81
 """Of the exported model (m/s^2); a weight's body is made for it."""

@@ -48,7 +48,7 @@ def slide_friction(static=5, presliding=10):
     }
 
 
-def driven(model, duration=2.0, interval=0.005):
+def driven(model, duration=1.5, interval=0.005):
     """A trial of two sines, which turn an axis often."""
     time = np.arange(0.0, duration, interval)
     shape = np.sin(4.0 * time) + 0.4 * np.sin(11.0 * time + 1.0)
