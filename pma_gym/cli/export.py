@@ -89,6 +89,7 @@ def _print_replay(model: Model, logs: Path, trials: Path | None) -> None:
     """Print how far MuJoCo is from the model's own simulation under the commands of logs."""
     from pma_gym.data.datasets.dataset import read_dataset
     from pma_gym.discovery.fitting.trial_states import read_states
+    from pma_gym.export.c_plant import si_unit
     from pma_gym.export.mjcf import replay
 
     with warnings_said():
@@ -98,7 +99,11 @@ def _print_replay(model: Model, logs: Path, trials: Path | None) -> None:
     runs = [(model.replace(dict(o)), each.trial) for o, each in zip(own, data.trials, strict=True)]
     rows = [[name, *_figures(sizes)] for name, sizes in replay(runs).items()]
     title = "Difference from the model, in standard deviations of the sensors (rms)"
-    print_table(TextTable(title, ("compared", *model.rig.outputs), rows))
+    header = [
+        each.name if each.sensor in model.parameters else f"{each.name} ({si_unit(each.unit)})"
+        for each in model.rig.signals
+    ]
+    print_table(TextTable(title, ("compared", *header), rows))
 
 
 def _figures(sizes: Iterable[float]) -> list[str]:

@@ -147,20 +147,21 @@ def mjcf(model: Model) -> str:
         for word, amount in WORDS[name](model.parameters[name]).items():
             amounts[word] += amount
     lost = [f"{each.effect}: {each.reason}" for each in lost_effects(model)]
-    position, speed = model.rig.signals
-    noise = deviations(model)
+    sensors = [
+        f'\n    <joint{"pos" if signal.is_position else "vel"} name="{signal.name}" joint="axis" '
+        f'noise="{float(noise)!r}"/>'
+        for signal, noise in zip(model.rig.signals, deviations(model), strict=True)
+        if signal.sensor in model.parameters
+    ]
     return template("axis.xml").substitute(
         name=quoteattr(model.name),
         title=escape(model.title.replace("--", "-")),
         lost="".join(f"\n       {line}" for line in lost) or " nothing",
         step=STEP_S,
         gravity=GRAVITY,
-        position=position.name,
-        speed=speed.name,
+        sensors="".join(sensors),
         command=direct_command(model) or "motor_voltage",
-        position_noise=repr(float(noise[0])),
-        speed_noise=repr(float(noise[1])),
-        **_texts(amounts, "slide" if position.is_travel else "hinge"),
+        **_texts(amounts, "slide" if model.rig.signals[0].is_travel else "hinge"),
     )
 
 
@@ -259,7 +260,8 @@ def replay(runs: Sequence[tuple[Model, Trial]]) -> dict[str, np.ndarray]:
     Returns:
         Root mean square of the difference over all rows, of position and speed, shape (2,), by what
         is compared. `IN_MUJOCO`: the true motion. `THE_REST`: the same without what MuJoCo cannot
-        carry. By effect that it cannot carry: what the sensors read with and without it.
+        carry. By effect that it cannot carry: what the sensors read with and without it. A signal
+        without a sensor is in SI.
     """
     squares: dict[str, np.ndarray] = {}
     for model, trial in runs:
