@@ -15,7 +15,7 @@ from pma_gym.codegen.elementary import clip
 from pma_gym.codegen.graph import CHANGING, Graph
 from pma_gym.codegen.text import c_text
 from pma_gym.envs import StationInfo
-from pma_gym.export.c_plant import identifier
+from pma_gym.export.c_plant import comment, identifier
 
 
 def pid_source(name: str, station: StationInfo) -> list[bytes]:
@@ -35,7 +35,7 @@ def pid_source(name: str, station: StationInfo) -> list[bytes]:
         {value[name].id: place for name, place in places.items()},
     )
     words = {
-        "station": f"{station.model.name} at {station.pressure / 1e3:g} kPa, {station.task.name}",
+        "station": f"{comment(station.model.name)} at {station.pressure / 1e3:g} kPa, {station.task.name}",
         "period": f"{station.period:g}",
         "ahead": f"{gains.lead - station.observation_delay:.6g}",
         "actuator": station.task.actuator,
@@ -57,9 +57,11 @@ def policy_source(name: str, policy: PolicyFile) -> list[bytes]:
     action, before, base = (graph.input(name, CHANGING) for name in names)
     asked = graph.value(policy.form.unclipped_voltage(action, before, base))
     words = {
-        "title": policy.title,
-        "observation": "\n".join(f" *   {entry}: {unit}" for entry, unit in policy.observation),
-        "base": policy.form.base or "none",
+        "title": comment(policy.title),
+        "observation": "\n".join(
+            f" *   {comment(f'{entry}: {unit}')}" for entry, unit in policy.observation
+        ),
+        "base": comment(policy.form.base or "none"),
         "inputs": str(weights.sizes[0]),
         "widest": str(max(weights.sizes)),
         "scaled": "observation[i]",

@@ -53,6 +53,15 @@ def identifier(name: str) -> str:
     return word if word[:1].isalpha() else f"m{word}"
 
 
+def comment(text: str) -> str:
+    r"""Make a text of a file that stays within a comment of C.
+
+    >>> comment("a */ b *\\\n/ c")
+    'a * / b *\\ / c'
+    """
+    return " ".join(text.replace("*/", "* /").split())
+
+
 _SI = {"mm": "m", "um": "m", "in": "m", "ms": "s", "deg": "rad", "kN": "N", "lbf": "N"}
 _SI |= {"kip": "N", "kPa": "Pa", "bar": "Pa", "%": "1"}
 
@@ -142,8 +151,8 @@ class CPlant:
         common = {"name": self.name, "command": str(self.command)}
         header = template("plant.h").substitute(
             common,
-            title=self.model.title.replace("*/", "* /"),
-            model=self.model.name.replace("*/", "* /"),
+            title=comment(self.model.title),
+            model=comment(self.model.name),
             **{
                 kind: "\n".join(self._enumerators(kind))
                 for kind in ("parameters", "states", "commands", "readings")

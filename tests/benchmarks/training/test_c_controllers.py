@@ -2,6 +2,7 @@
 
 import ctypes
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -66,6 +67,8 @@ def test_a_policy_in_c_acts_as_its_network(activation, output, form, tmp_path):
         output=output,
         scaled=output == "clip",
     )
+    # What a file says stays in a comment.
+    policy = replace(policy, title="PPO */ #error")
     library = exported(tmp_path, save_policy_file(policy, tmp_path / "mine"))
     library.own_act.restype, library.own_act.argtypes = REAL, [ctypes.c_void_p]
     library.own_volts.restype, library.own_volts.argtypes = REAL, [REAL] * 3
