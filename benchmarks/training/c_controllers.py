@@ -35,7 +35,8 @@ def pid_source(name: str, station: StationInfo) -> list[bytes]:
         {value[name].id: place for name, place in places.items()},
     )
     words = {
-        "station": f"{comment(station.model.name)} at {station.pressure / 1e3:g} kPa, {station.task.name}",
+        "station": f"{comment(station.model.name)}, {station.task.name}",
+        "pressure": f"{station.pressure / 1e3:g}",
         "period": f"{station.period:g}",
         "ahead": f"{gains.lead - station.observation_delay:.6g}",
         "actuator": station.task.actuator,

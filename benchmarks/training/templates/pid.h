@@ -1,4 +1,4 @@
-/* PID of pma-gym for $station, exported; SI and volts.
+/* PID of pma-gym for $station at $pressure kPa, exported; SI and volts.
  *
  * Call ${name}_reset, then ${name}_act every $period s with the position that was measured and the
  * reference $ahead s ahead of the call's time.
