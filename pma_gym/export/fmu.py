@@ -89,6 +89,7 @@ def _description(plant: CPlant, version: int, token: str, sources: Sequence[str]
     head["instantiationToken" if version == 3 else "guid"] = token
     root = Element("fmiModelDescription", head)
     identity = {"modelIdentifier": plant.name, "canHandleVariableCommunicationStepSize": "true"}
+    identity |= {"canInterpolateInputs": "true"} if version == 2 else {}
     kind = SubElement(root, "CoSimulation", identity)
     variables = list(_variables(plant))
     _write_units(SubElement(root, "UnitDefinitions"), [each for each, _ in variables])

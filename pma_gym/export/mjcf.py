@@ -52,7 +52,7 @@ WORDS: dict[str, Callable[[Parameters], Words]] = {
     "joint_friction": lambda p: {"friction": p.dynamic},
     "joint_spring": lambda p: {"stiffness": p.stiffness, "rest": p.rest},
     "joint_hardening_spring": lambda p: {"cubic": p.cubic},
-    "joint_weight": lambda p: {"moment": p.moment, "lowest_point": -p.offset},
+    "joint_weight": lambda p: {"moment": p.moment, "offset": p.offset},
     "constant_force": lambda p: {"constant": p.force},
     "constant_torque": lambda p: {"constant": p.torque},
     "drive_lag": lambda p: {"lag": p.time_constant if p.share > 0.0 else 0.0},
@@ -176,7 +176,7 @@ def _texts(a: Mapping[str, float], kind: str) -> dict[str, str]:
         # Half of the inertia is that of a point mass.
         arm = 0.5 * a["inertia"] * GRAVITY / a["moment"]
         mass, own = a["moment"] / GRAVITY / arm, 0.5 * a["inertia"]
-        at = -arm * math.sin(-a["lowest_point"]), 0.0, -arm * math.cos(a["lowest_point"])
+        at = -arm * math.sin(a["offset"]), 0.0, -arm * math.cos(a["offset"])
     actuator = f'gainprm="{a["gain"]!r}" biastype="affine" biasprm="{bias!r} 0 0"'
     if a["highest"]:
         actuator += f' ctrllimited="true" ctrlrange="0 {a["highest"]!r}"'

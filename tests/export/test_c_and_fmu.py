@@ -99,15 +99,16 @@ def test_an_fmu_is_valid_and_moves_as_the_plant_does(version, tmp_path):
     assert (by_name["angle"].unit, by_name["angle"].declaredType) == ("rad", None)
     heavier = {"inertia.inertia": 0.008, "state.angle": 0.1, "state.lag_encoder": 0.1}
     own = model.replace({"inertia.inertia_kg_m2": 0.008, "joint_start.angle_deg": np.degrees(0.1)})
-    for values, compared in (({}, model), (heavier, own)):
-        got = stepped(fmpy, path, described, trial, values)
-        simulated = Plant(compared).simulate(trial, noise=False, interpolation="zoh")
+    cases = [({}, model, "zoh"), (heavier, own, "zoh")] + [({}, model, "foh")] * (version == 2)
+    for values, compared, interpolation in cases:
+        got = stepped(fmpy, path, described, trial, values, interpolation == "foh")
+        simulated = Plant(compared).simulate(trial, noise=False, interpolation=interpolation)
         # The encoder's lag follows the motion that a trial begins with.
         agree(got[10:], columns(simulated.measurements.values())[10:], compared)
 
 
-def stepped(fmpy, path, described, trial, values):
-    """Readings of an FMU whose inputs are held from row to row."""
+def stepped(fmpy, path, described, trial, values, linear):
+    """Readings of an FMU whose inputs are held from row to row, or linear."""
     unit = fmpy.instantiate_fmu(fmpy.extract(str(path)), described, "CoSimulation")
     by_name = {each.name: each.valueReference for each in described.modelVariables}
     kind = "Real" if described.fmiVersion == "2.0" else "Float64"
@@ -119,8 +120,11 @@ def stepped(fmpy, path, described, trial, values):
     unit.exitInitializationMode()
     readings = [by_name["angle"], by_name["speed"]]
     rows = [get(readings)]
+    torque, command = trial.commands["torque_command"], [by_name["torque_command"]]
     for k, duration in enumerate(np.diff(trial.time)):
-        put([by_name["torque_command"]], [float(trial.commands["torque_command"][k])])
+        put(command, [float(torque[k])])
+        if linear:
+            unit.setRealInputDerivatives(command, [1], [(torque[k + 1] - torque[k]) / duration])
         unit.doStep(currentCommunicationPoint=trial.time[k], communicationStepSize=duration)
         rows.append(get(readings))
     unit.terminate()

@@ -1,5 +1,5 @@
 /* FMI $fmi.0 co-simulation around the plant of $name.h. A value reference counts doubles of an
- * instance; inputs are held during a step. */
+ * instance. Inputs are held during a step; FMI 2.0 may give their slopes for the next one. */
 #include "$name.h"
 
 #include <math.h>
@@ -15,10 +15,11 @@ enum { OK, ERROR = 3 };
 typedef struct {
     double time, command[${name}_commands], reading[${name}_readings];
     $name plant;
+    double slope[${name}_commands];
 } instance;
 
 static int reset(instance *it) {
-    it->time = 0.0;
+    memset(it, 0, sizeof *it);
     ${name}_start(&it->plant);
     memcpy(it->command, it->plant.state + $command, sizeof it->command);
     ${name}_read(&it->plant, it->reading);
@@ -49,7 +50,10 @@ static int set(instance *it, const unsigned *reference, size_t count, const doub
 }
 
 static int advance(instance *it, double time, double duration) {
-    ${name}_step(&it->plant, it->command, it->command, duration);
+    double last[${name}_commands];
+    for (int i = 0; i < ${name}_commands; i++) last[i] = it->command[i] + it->slope[i] * duration;
+    ${name}_step(&it->plant, it->command, last, duration);
+    memset(it->slope, 0, sizeof it->slope);
     ${name}_read(&it->plant, it->reading);
     it->time = time + duration;
     for (int i = 0; i < ${name}_readings; i++)
@@ -157,6 +161,17 @@ int fmi2SetReal(void *it, const unsigned *reference, size_t count, const double 
     return set(it, reference, count, value);
 }
 
+int fmi2SetRealInputDerivatives(void *it, const unsigned *reference, size_t count,
+                                const int *order, const double *value) {
+    instance *own = it;
+    for (size_t i = 0; i < count; i++) {
+        double *command = (double *)own + reference[i];
+        if (order[i] != 1 || command < own->command || command >= own->reading) return ERROR;
+        own->slope[command - own->command] = value[i];
+    }
+    return OK;
+}
+
 int fmi2DoStep(void *it, double time, double duration, int final) {
     (void)final;
     return advance(it, time, duration);
@@ -167,7 +182,7 @@ PASSED(fmi2Terminate) ABSENT(fmi2GetInteger) ABSENT(fmi2GetBoolean) ABSENT(fmi2G
 ABSENT(fmi2SetInteger) ABSENT(fmi2SetBoolean) ABSENT(fmi2SetString) ABSENT(fmi2GetFMUstate)
 ABSENT(fmi2SetFMUstate) ABSENT(fmi2FreeFMUstate) ABSENT(fmi2SerializedFMUstateSize)
 ABSENT(fmi2SerializeFMUstate) ABSENT(fmi2DeSerializeFMUstate) ABSENT(fmi2GetDirectionalDerivative)
-ABSENT(fmi2SetRealInputDerivatives) ABSENT(fmi2GetRealOutputDerivatives) ABSENT(fmi2CancelStep)
+ABSENT(fmi2GetRealOutputDerivatives) ABSENT(fmi2CancelStep)
 ABSENT(fmi2GetStatus) ABSENT(fmi2GetRealStatus) ABSENT(fmi2GetIntegerStatus)
 ABSENT(fmi2GetBooleanStatus) ABSENT(fmi2GetStringStatus)
 
