@@ -109,7 +109,9 @@ def test_an_fmu_is_valid_and_moves_as_the_plant_does(version, tmp_path):
 
 def stepped(fmpy, path, described, trial, values, linear):
     """Readings of an FMU whose inputs are held from row to row, or linear."""
-    unit = fmpy.instantiate_fmu(fmpy.extract(str(path)), described, "CoSimulation")
+    unit = fmpy.instantiate_fmu(
+        fmpy.extract(str(path), unzipdir=str(path.with_suffix(""))), described, "CoSimulation"
+    )
     by_name = {each.name: each.valueReference for each in described.modelVariables}
     kind = "Real" if described.fmiVersion == "2.0" else "Float64"
     get, put = getattr(unit, f"get{kind}"), getattr(unit, f"set{kind}")
