@@ -3,13 +3,15 @@
 PID on top of the improved feed-forward.
 """
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from controllers.design.designs import Gains, scheduled_gains
 from controllers.models.voltage import VOLTAGE_LIMIT, nominal_offset
 from controllers.registry import Reference
+from pma_gym.codegen.elementary import clip
+from pma_gym.codegen.generic import where
 from pma_gym.envs import Measurement, StationInfo
 
 if TYPE_CHECKING:
@@ -82,14 +84,10 @@ class PID:
         gains = self.gains.scaled(reference / self._span)
         error = reference - self._position(measurement)
         change = 0.0 if self._last_error is None else error - self._last_error
-        self._derivative = (gains.filter * self._derivative + gains.derivative * change) / (
-            gains.filter + period
-        )
-        action = gains.proportional * error + self._integral + self._derivative
-        unclipped = self._offset + self.feedforward(time) + action
-        voltage = min(max(unclipped, 0.0), VOLTAGE_LIMIT)
-        if voltage == unclipped or (unclipped > voltage) != (error > 0.0):
-            self._integral += gains.integral * period * error
+        base = self._offset + self.feedforward(time)
+        memories = self._integral, self._derivative
+        voltage, memories = pid_law(gains, (error, change), base, memories, period)
+        self._integral, self._derivative = memories
         self._last_error = error
         return voltage
 
@@ -104,6 +102,31 @@ class PID:
         gains = self._fixed_gains or scheduled_gains(self.name, station)
         law = linear_law(gains.scaled(position / station.task.schedule.span), station.period)
         return control.StateSpace(*law, station.period)
+
+
+def pid_law(
+    gains: Gains,
+    errors: tuple[Any, Any],
+    base: float,
+    memories: tuple[Any, Any],
+    period: float,
+) -> tuple[Any, tuple[Any, Any]]:
+    """Voltage (V) of one control step, of numbers or traced values, and the memories after it.
+
+    Args:
+        gains: in force.
+        errors: of the position (m or rad), and its change since the step before.
+        base: offset and feed-forward (V).
+        memories: I and D (V).
+        period: control period (s).
+    """
+    (error, change), (integral, derivative) = errors, memories
+    derivative = (gains.filter * derivative + gains.derivative * change) / (gains.filter + period)
+    unclipped = base + (gains.proportional * error + integral + derivative)
+    voltage = clip(unclipped, 0.0, VOLTAGE_LIMIT)
+    grows = (voltage == unclipped) | ((unclipped > voltage) ^ (error > 0.0))
+    integral = integral + where(grows, gains.integral * period * error, 0.0)
+    return voltage, (integral, derivative)
 
 
 def linear_law(

@@ -1,6 +1,7 @@
 """The commands about policies: `train` and `export`."""
 
 from dataclasses import replace
+from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
@@ -59,27 +60,42 @@ def train(
         run_train(replace(order, seed=number), folder, SafeConsole(), ship)
 
 
+class Target(StrEnum):
+    """What a controller is exported to."""
+
+    POLICY = "policy"
+    ONNX = "onnx"
+    C = "c"
+
+
 @app.command(
     epilog="Example: python -m benchmarks export model.zip --env pma_gym/IsokineticRotation-v0"
 )
 def export(
-    model: Annotated[Path, typer.Argument(help="Zip that Stable-Baselines3 saved.")],
-    env: Annotated[str, typer.Option(help="Id of the environment that it was trained on.")],
+    controller: Annotated[
+        Path, typer.Argument(help="Zip that Stable-Baselines3 saved, a policy's .json, or pid.")
+    ],
+    env: Annotated[
+        str | None, typer.Option(help="Id of the environment of a zip's training or of a PID.")
+    ] = None,
+    to: Annotated[
+        Target, typer.Option(help="A policy file, ONNX beside it, or C.")
+    ] = Target.POLICY,
     env_kwargs: Annotated[str, typer.Option(help="Its keyword arguments, as JSON.")] = "{}",
     vecnormalize: Annotated[
         Path | None, typer.Option(help="Its statistics (.npz), if trained in a VecNormalize.")
     ] = None,
     out: Annotated[
         Path | None,
-        typer.Option(help="DIR/NAME of the policy; results/policies/MODEL if not given."),
+        typer.Option(help="DIR/NAME of what is written; results/policies/CONTROLLER if not given."),
     ] = None,
-    onnx: Annotated[bool, typer.Option("--onnx", help="Write NAME.onnx too.")] = False,
 ) -> None:
-    """Make a policy file of your own model, which the benchmark runs without torch."""
-    from benchmarks.training.export import export_model, parsed_kwargs
+    """Make a policy file of your own model, or C of a policy or the PID."""
+    from benchmarks.training.export import export_controller, parsed_kwargs
 
     kwargs = parsed_kwargs(env_kwargs)
-    usual = RESULTS / "policies" / model.stem
+    usual = RESULTS / "policies" / controller.stem
     if out is None:
         usual.parent.mkdir(parents=True, exist_ok=True)
-    print("\n".join(map(str, export_model(model, env, kwargs, out or usual, vecnormalize, onnx))))
+    made = export_controller(controller, to, env, kwargs, out or usual, vecnormalize)
+    print("\n".join(map(str, made)))

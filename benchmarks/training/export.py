@@ -1,4 +1,4 @@
-"""Networks of Stable-Baselines3 as policies: of a training here, and of somebody's zip.
+"""Controllers for elsewhere: networks of Stable-Baselines3 as policies, and all of them as C.
 
 `python -m benchmarks export` reads a zip's JSON and its tensors, as weights only: nothing of it is
 unpickled, so nothing in it executes.
@@ -14,15 +14,23 @@ from typing import Any, NamedTuple
 import gymnasium as gym
 import numpy as np
 
+from benchmarks.training.c_controllers import pid_source, policy_source
 from benchmarks.training.onnx_file import ExportError, onnx_bytes
 from controllers.design.designs import task_kind
 from controllers.policies.adapter import MIDDLE_V, ActionMapping
 from controllers.policies.network import Layer, Scaling, Weights
 from controllers.policies.observation_spec import ObservationSpec
-from controllers.policies.policy_file import PolicyFile, policy_pair, save_policy_file
+from controllers.policies.policy_file import (
+    LARGEST_MIB,
+    PolicyFile,
+    load_policy_file,
+    policy_pair,
+    save_policy_file,
+)
 from pma_gym.documents import parse_json
 from pma_gym.envs import ENVIRONMENTS, PMAEnv
-from pma_gym.files import check_output, replace_file
+from pma_gym.export.c_plant import identifier
+from pma_gym.files import check_output, replace_files
 from pma_gym.limits import check_limit, limit
 
 
@@ -54,6 +62,9 @@ ACTORS = {
 """Networks by algorithm."""
 
 ONLY = f"only an MlpPolicy of {', '.join(ACTORS)} can be exported"
+
+TARGETS = ("policy", "onnx", "c")
+"""What a zip is exported to."""
 
 LOOP = ("control_rate_hz", "action_delay_s", "observation_delay_s")
 
@@ -99,40 +110,60 @@ def weights_from_state(
     return Weights(layers, activation.lower(), actor.output, scaling)
 
 
-def export_model(
-    model: Path,
-    environment: str,
+def export_controller(
+    source: Path,
+    target: str,
+    environment: str | None,
     kwargs: Mapping[str, Any],
     out: Path,
     statistics: Path | None = None,
-    onnx: bool = False,
 ) -> list[Path]:
-    """Write the policy file of somebody's own model.
+    """Write a controller as a policy file, as ONNX or as C.
 
     Args:
-        model: zip that Stable-Baselines3 saved.
-        environment: id of the environment that it was trained on.
+        source: zip that Stable-Baselines3 saved, a policy's file, or `pid`.
+        target: "policy", "onnx" or "c"; of a zip the policy is written in any case.
+        environment: id of the environment that a zip was trained on, or that a PID is for.
         kwargs: keyword arguments of that environment.
-        out: NAME of the policy, its folder before it.
-        statistics: file of the statistics, if it was trained in a VecNormalize.
-        onnx: whether NAME.onnx is written too.
+        out: NAME of what is written, its folder before it.
+        statistics: file of the statistics, if a zip was trained in a VecNormalize.
     Returns:
         The files written.
     Raises:
-        ExportError: a model that cannot be exported; says why and what to do.
+        ExportError: a controller that cannot be exported; says why and what to do.
         OutputError: a file that cannot be written; nothing is.
-        PolicyError: a policy that would not load.
+        PolicyError: a policy that cannot be read or would not load.
     """
     words, weights = policy_pair(out)
-    target = words.with_suffix(".onnx")
-    written = [words, weights, *([target] if onnx else [])]
+    is_pid, is_policy = str(source) == "pid", source.suffix in LARGEST_MIB
+    known = ("c",) if is_pid else ("onnx", "c") if is_policy else TARGETS
+    if target not in known:
+        raise ExportError(f"{source} can be exported --to {' or '.join(known)}, got {target}")
+    code = [words.with_name(f"{identifier(words.stem)}.{end}") for end in ("h", "c")]
+    extra = {"policy": [], "onnx": [words.with_suffix(".onnx")], "c": code}[target]
+    written = [*(() if is_pid or is_policy else (words, weights)), *extra]
     for path in written:
         check_output(path)
-    policy = _policy(model, environment, kwargs, statistics, words.stem)
-    graph = onnx_bytes(policy) if onnx else b""
-    save_policy_file(policy, out)
-    if onnx:
-        replace_file(target, graph)
+    contents: list[bytes] = []
+    if is_pid:
+        if "pressure_kpa" not in kwargs:
+            raise ExportError(
+                "the gains of a PID are of a pressure, which no trial says here; give it, such as "
+                "--env-kwargs '{\"pressure_kpa\": 300}'"
+            )
+        env = _environment(environment, kwargs)
+        env.reset(seed=0)
+        contents = pid_source(words.stem, env.station)
+    else:
+        trained = (source, environment, kwargs, statistics, words.stem)
+        policy = load_policy_file(source) if is_policy else _policy(*trained)
+        if target == "c":
+            contents = policy_source(words.stem, policy)
+        elif target == "onnx":
+            contents = [onnx_bytes(policy)]
+        if not is_policy:
+            save_policy_file(policy, out)
+    replace_files(dict(zip(extra, contents, strict=True)))
     return written
 
 
@@ -155,7 +186,11 @@ def parsed_kwargs(text: str) -> dict[str, Any]:
 
 
 def _policy(
-    model: Path, environment: str, kwargs: Mapping[str, Any], statistics: Path | None, name: str
+    model: Path,
+    environment: str | None,
+    kwargs: Mapping[str, Any],
+    statistics: Path | None,
+    name: str,
 ) -> PolicyFile:
     env = _environment(environment, kwargs)
     data, state = _read(model)
@@ -193,8 +228,8 @@ def _policy(
     )
 
 
-def _environment(name: str, kwargs: Mapping[str, Any]) -> PMAEnv:
-    if name not in ENVIRONMENTS:
+def _environment(name: str | None, kwargs: Mapping[str, Any]) -> PMAEnv:
+    if name is None or name not in ENVIRONMENTS:
         raise ExportError(f"--env must be one of {', '.join(ENVIRONMENTS)}, got {name!r}")
     try:
         env: Any = gym.make(name, **kwargs).unwrapped

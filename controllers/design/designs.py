@@ -10,6 +10,8 @@ from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
+from pma_gym.codegen.elementary import clip, maximum
+from pma_gym.codegen.generic import square_root
 from pma_gym.data.signals import SIGNALS
 from pma_gym.documents import read_toml
 from pma_gym.effects.cable.hanging_load import GRAVITY
@@ -230,7 +232,7 @@ class Gains(NamedTuple):
     end_factor: float = 1.0
     start_factor: float = 1.0
 
-    def scaled(self, share: float) -> "Gains":
+    def scaled(self, share: Any) -> "Gains":  # noqa: ANN401
         """The gains in force where the reference covers this share of its range.
 
         They grow with the square of the share, to `end_factor`: at low pressure the muscle
@@ -242,12 +244,12 @@ class Gains(NamedTuple):
         at the end of phase III, every push that noise makes stays, for the drive cannot push
         back and nothing else does. k_p and k_d pass noise on from sample to sample.
         """
-        clipped = min(max(share, 0.0), 1.0)
+        clipped = clip(share, 0.0, 1.0)
         end = 1.0 + (self.end_factor - 1.0) * clipped * clipped
-        start = 1.0 + (self.start_factor - 1.0) * max(0.0, 1.0 - clipped / START_SHARE)
+        start = 1.0 + (self.start_factor - 1.0) * maximum(1.0 - clipped / START_SHARE, 0.0)
         return self._replace(
             proportional=end * start * self.proportional,
-            integral=end * math.sqrt(start) * self.integral,
+            integral=end * square_root(start) * self.integral,
             derivative=end * start * self.derivative,
             end_factor=1.0,
             start_factor=1.0,

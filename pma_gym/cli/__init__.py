@@ -1,4 +1,4 @@
-"""`pma-gym`: simulate, evaluate, diagnose and fit, from a shell."""
+"""`pma-gym`: simulate, evaluate, diagnose, fit and export, from a shell."""
 
 import sys
 from collections.abc import Sequence
@@ -11,6 +11,7 @@ import typer
 
 from pma_gym.cli.convert import compare, convert
 from pma_gym.cli.discovery import diagnose, fit
+from pma_gym.cli.export import export
 from pma_gym.cli.options import JsonOption, StrictTyper
 from pma_gym.cli.terminal import (
     NamedModel,
@@ -160,6 +161,10 @@ app.command(
     short_help="Print the misfit of a model to logs.",
     epilog="Example: pma-gym compare logs --model fitted/model.toml",
 )(compare)
+app.command(
+    short_help="Write a model as C, as an FMU or for MuJoCo.",
+    epilog="Example: pma-gym export station --to fmu --start 1,5",
+)(export)
 app.command(
     epilog="Example: pma-gym watch --task rotation --controller controllers:PID --video pid.gif"
 )(watch)

@@ -1,4 +1,4 @@
-"""Traced arithmetic as readable Python, and its value for given numbers."""
+"""Traced arithmetic as readable Python, as C, and its value for given numbers."""
 
 import re
 from collections.abc import Callable, Mapping, Sequence
@@ -92,6 +92,54 @@ def _number(number: Number) -> str:
     if isinstance(number, float) and (number != number or abs(number) == float("inf")):
         return f'float("{number}")'
     return f"({number!r})" if number < 0 else repr(number)
+
+
+_C = {
+    **_REAL,
+    "absolute": "fabs({})",
+    "square_root": "sqrt({})",
+    "to_real": "(double){}",
+    "not": "!{}",
+    "select": "{} ? {} : {}",
+}
+_C_TYPES = {"real": "double", "integer": "uint64_t", "truth": "int"}
+
+C_PREAMBLE = """\
+static uint64_t to_bits(double real) { uint64_t bits; memcpy(&bits, &real, 8); return bits; }
+static double from_bits(uint64_t bits) { double real; memcpy(&real, &bits, 8); return real; }
+"""
+"""Functions that statements of `c_text` call; after math.h, stdint.h and string.h."""
+
+
+def c_text(results: Mapping[str, Value], inputs: Mapping[int, str]) -> str:
+    """The statements of C99 that do the same arithmetic in the same order.
+
+    Compile them without contraction (`-ffp-contract=off`), or sums are rounded otherwise.
+
+    Args:
+        results: values by what they are assigned to, at the end and in order.
+        inputs: C expressions of the inputs, and of what else is known, by id.
+    """
+    names, lines = dict(inputs), []
+    for value in order(results.values()):
+        if value.is_constant:
+            names[value.id] = _c_number(value.data)
+        elif value.id not in names:
+            names[value.id] = f"v{value.id}"
+            text = _C[value.operation].format(*(names[part.id] for part in value.operands))
+            lines.append(f"    const {_C_TYPES[value.kind]} v{value.id} = {text};")
+    lines += [f"    {target} = {names[value.id]};" for target, value in results.items()]
+    return "\n".join(lines)
+
+
+def _c_number(number: Number) -> str:
+    if isinstance(number, bool):
+        return str(int(number))
+    if isinstance(number, int):
+        return f"UINT64_C({number})"
+    if number != number:
+        return "NAN"
+    return {"inf": "INFINITY", "-inf": "(-INFINITY)"}.get(repr(number), f"({number!r})")
 
 
 _NUMPY: dict[str, Callable] = {

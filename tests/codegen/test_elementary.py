@@ -3,7 +3,9 @@
 Derivatives that a law says itself.
 """
 
+import ctypes
 import math
+import shutil
 
 import numpy as np
 import pytest
@@ -12,9 +14,10 @@ import sympy
 from pma_gym.codegen.derivative import derivative
 from pma_gym.codegen.elementary import NUMPY
 from pma_gym.codegen.graph import CHANGING, FIXED, Graph
-from pma_gym.codegen.text import evaluate, python_text
+from pma_gym.codegen.text import C_PREAMBLE, c_text, evaluate, python_text
 from pma_gym.codegen.trace import operation_counts, trace
 from pma_gym.effects.arithmetic import exponential, interp2d, sloping
+from pma_gym.export.fmu import shared_library
 from pma_gym.plant.forms.symbolic import _Expressions
 
 LAWS = {
@@ -187,3 +190,22 @@ def test_what_a_law_says_of_another_value_stays_out_of_it():
     computed = evaluate([by_x, by_y], {"x": 2.0, "y": 0.5})
     expected = [math.exp(0.5), 2.0 * math.exp(0.5)]
     assert [float(number) for number in computed] == pytest.approx(expected, rel=1e-12)
+
+
+@pytest.mark.skipif(shutil.which("cc") is None, reason="there is no C compiler cc")
+def test_c_has_the_bits_of_all_laws(tmp_path):
+    graph = Graph()
+    x = graph.input("x", CHANGING)
+    values = [trace(law, x) for law in LAWS.values()]
+    text = c_text({f"out[{i}]": value for i, value in enumerate(values)}, {x.id: "x"})
+    head = "#include <math.h>\n#include <stdint.h>\n#include <string.h>\n" + C_PREAMBLE
+    source = f"{head}void laws(double x, double *out) {{\n{text}\n}}\n"
+    (tmp_path / "laws.so").write_bytes(shared_library({"laws.c": source}, ["laws.c"]))
+    function = ctypes.CDLL(str(tmp_path / "laws.so")).laws
+    function.argtypes = [ctypes.c_double, ctypes.c_void_p]
+    arguments = np.array([*ENDS, *ORDINARY[::16], math.nan])
+    got = np.empty((len(arguments), len(values)))
+    for argument, row in zip(arguments, got, strict=True):
+        function(argument, row.ctypes.data)
+    expected = np.stack(evaluate(values, {"x": arguments}), axis=1)
+    assert np.array_equal(got, expected, equal_nan=True)

@@ -210,7 +210,7 @@ def test_a_users_own_model_drives_as_a_policy_as_it_did_as_an_agent(tmp_path):
 
 def test_onnx_beside_it(tmp_path):
     pytest.importorskip("onnx")
-    policy = exported(PPO("MlpPolicy", Small(), device="cpu"), tmp_path, "--onnx")
+    policy = exported(PPO("MlpPolicy", Small(), device="cpu"), tmp_path, "--to", "onnx")
     assert (tmp_path / "own.onnx").read_bytes() == onnx_bytes(policy)
 
 

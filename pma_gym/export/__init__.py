@@ -1,0 +1,1 @@
+"""A model's plant for other programs: C99, FMU, MuJoCo."""
