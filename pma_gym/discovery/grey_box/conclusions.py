@@ -27,6 +27,7 @@ from pma_gym.discovery.grey_box.thresholds import (
     MATERIAL,
     NOISES,
     ROWS_LATE,
+    SMALL,
     SURE,
 )
 from pma_gym.discovery.result.estimates import Estimate, Moved, NamedEffect, TrialState
@@ -82,12 +83,16 @@ class Conclusions:
         """The hypothesis that is proposed, with a delay.
 
         The last whose effects are surely of some size, and which predicts trials left out no worse.
+        Where predictions miss widely all the same, the last one carries more than a small share:
+        less than that is how approximate the others are.
         """
         best = self.path[0]
         for each in self.path[1:]:
             sized = all(self._is_sized(each, move) for move in each.moves)
             if sized and self.misfit(each) <= self.misfit(best) * (1.0 + 1e-3):
-                best = each
+                carried = self.misfit(best) ** 2 - self.misfit(each) ** 2
+                if self.misfit(each) < NOISES or carried > SMALL * self.misfit(self.path[0]) ** 2:
+                    best = each
         return best
 
     def curves(self, each: Hypothesis) -> list[Array]:
@@ -197,7 +202,9 @@ class Conclusions:
             return 0.0
         late, error = last.fit.point.delay, last.fit.deviations["delay"]
         row = self.selection.span / self.selection.stride / self.selection.block
-        if late < max(ROWS_LATE * row, CONFIDENCE * error):
+        # A line half a row late is a held command in time.
+        prompt = (0.0, 0.5 * row) if self.selection.linear else (0.0,)
+        if min(abs(late - each) for each in prompt) < max(ROWS_LATE * row, CONFIDENCE * error):
             return 0.0
         price = np.log(len(self.candidates)) + self.selection.price_of(last, 1)
         return max(0.0, last.fit.value - self._prompt - float(price))

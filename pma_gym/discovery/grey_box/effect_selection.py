@@ -47,11 +47,15 @@ Array = NDArray[np.float64]
 WIDER = (1.0, 0.2, 5.0)
 """Times the usual shape (a Stribeck speed) from which the fuller law of an effect is fitted."""
 
-CAREFUL = ((0.3, 0.5, 1.0), (1.0, 0.2, 10.0), (0.5, 0.5, 0.1))
-"""Further starts of a candidate.
+PARTS, LESS, SLIPS = (0.3, 1.0, 3.0), (0.5, 0.1, 0.02), (0.01, 0.1, 1.0, 10.0, 100.0)
+"""Starts of a candidate.
 
-Share of its size, of the latent force, and times its presliding distance.
+Times the size that the screening promises, shares of the latent force, and times the usual
+presliding distance.
 """
+
+FITTED, FURTHER = 2, 4
+"""How many of them are fitted, the likeliest as they are, and in a careful fit."""
 
 SUBSTEP_S, ROUGH_SUBSTEP_S = 1e-3, 3e-4
 """Longest integration step, without and with dry friction."""
@@ -545,19 +549,52 @@ class EffectSelection:
         here = move.start or now.fit.point
         whole = replace(here, numbers={**box.numbers(), **here.numbers})
         best = None
-        starts = ((1.0, 0.5, 1.0), (0.5, 0.5, 10.0)) if law.scanned else ((1.0, 0.5, 1.0),)
-        for part, share, wide in CAREFUL if careful else starts:
-            values = dict(at)
-            for c in more:
-                if c.name in absent:
-                    values[c.name] = absent[c.name] + part * (at[c.name] - absent[c.name])
-                else:
-                    values[c.name] = float(np.clip(whole.numbers[c.name] * wide, c.lower, c.upper))
-            start = with_values(whole, with_tied(values, tied))
-            made = fit(box, self._weaker(start, share), [*now.fit.coordinates, *more], tied)
+        for start in self._starts(box, whole, at, absent, more, tied)[FITTED * careful :][
+            : FURTHER if careful else FITTED
+        ]:
+            made = fit(box, start, [*now.fit.coordinates, *more], tied)
+            best = made if best is None or made.value > best.value else best
+        if not careful:
+            # From none of it, a fit is no less likely than without.
+            none = with_values(whole, with_tied({**at, **absent}, tied))
+            made = fit(box, none, [*now.fit.coordinates, *more], tied)
             best = made if best is None or made.value > best.value else best
         assert best is not None
         return Hypothesis(box, best, (*now.moves, move), now.rivals)
+
+    def _starts(
+        self,
+        box: GreyBox,
+        whole: Point,
+        at: Mapping[str, float],
+        absent: Mapping[str, float],
+        more: Sequence[Coordinate],
+        tied: Mapping[str, str],
+    ) -> list[Point]:
+        """Starts of a candidate's fit, the likeliest as they are first.
+
+        One for each presliding distance, else for each latent force: these lead to other optima.
+        """
+        slips = [c for c in more if c.name not in absent]
+        points, kinds = [], []
+        for part in PARTS:
+            for less in LESS:
+                for slip in SLIPS if slips else (1.0,):
+                    values = dict(at)
+                    for c in more:
+                        size = absent.get(c.name, 0.0)
+                        values[c.name] = (
+                            float(np.clip(whole.numbers[c.name] * slip, c.lower, c.upper))
+                            if c in slips
+                            else size + part * (at[c.name] - size)
+                        )
+                    start = with_values(whole, with_tied(values, tied))
+                    points.append(self._weaker(start, less))
+                    kinds.append(slip if slips else less)
+        likely = log_likelihood(box.innovations(points), box.rows)
+        order = np.argsort(-likely)
+        first = {kind: at for at, kind in reversed([(i, kinds[i]) for i in order])}
+        return [points[i] for i in order if first[kinds[i]] == i]
 
     def _weaker(self, point: Point, share: float) -> Point:
         """A point with a share of its latent force, in no trial more than thrice the least one.
@@ -838,17 +875,17 @@ class EffectSelection:
 
     def _extended(self, beam: Sequence[list[Hypothesis]], step: str) -> list[list[Hypothesis]]:
         """Every chain with each of its most promising moves, the likeliest for its price first."""
-        seen, tried = set[frozenset[str]](), list[list[Hypothesis]]()
+        seen, tried = set[tuple[frozenset[str], bool]](), list[list[Hypothesis]]()
         for rank, chain in enumerate(beam):
             now = chain[-1]
             moves = self._worth_a_fit(now)
             for number, move in enumerate(moves if not rank else moves[:BESIDE]):
-                names = frozenset(each.name for each in (*now.moves, move))
-                if names in seen:
+                key = frozenset(each.name for each in (*now.moves, move)), move.start is not None
+                if key in seen:
                     continue
+                seen.add(key)
                 self.tell(step, number, len(moves))
                 larger = self.tried(now, move)
-                seen |= {names} if move.start is None else set()
                 self.gains.setdefault(move.name, larger.fit.value - now.fit.value)
                 tried += [[*chain, larger]] if not self._at_end(larger) else []
         return sorted(tried, key=self._worth, reverse=True)

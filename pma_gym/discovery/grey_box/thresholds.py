@@ -69,3 +69,6 @@ FAR = 3.0
 
 Assumption: a data sheet or a scale is off by less, so that beyond it the fit bends the value.
 """
+
+SMALL = 0.01
+"""Share of the first misfit (mean square) that an addition carries where much is left after it."""
