@@ -37,11 +37,12 @@ from pma_gym.effects.drive.rotor import ROTOR
 from pma_gym.effects.drive.servo import SERVO, SERVO_INERTIA
 from pma_gym.effects.drive.torque_ripple import TORQUE_RIPPLE
 from pma_gym.effects.drive.two_way_drive import TWO_WAY_DRIVE
-from pma_gym.effects.effect import Effect
+from pma_gym.effects.effect import Effect, antagonist
 from pma_gym.effects.joint.inertia import INERTIA, JOINT_START
+from pma_gym.effects.joint.moment_arm import LEVER, PULLEY
 from pma_gym.effects.joint.motor import DC_MOTOR, TORQUE_DRIVE
 from pma_gym.effects.joint.passive_torque import JOINT_DAMPING, JOINT_FRICTION, JOINT_WEIGHT
-from pma_gym.effects.limits import LIMITS, VALIDITY
+from pma_gym.effects.limits import JOINT_RANGE, LIMITS, VALIDITY
 from pma_gym.effects.muscle.colbrunn import COLBRUNN_SPRING
 from pma_gym.effects.muscle.contractile_force import CONTRACTILE_FORCE
 from pma_gym.effects.muscle.creep import CREEP, SLOW_CREEP
@@ -73,6 +74,7 @@ from pma_gym.effects.residual_law import (
     RESIDUAL_FORCE_OF_VELOCITY,
     RESIDUAL_LOAD,
 )
+from pma_gym.effects.rig_ports import SECOND_PORTS
 from pma_gym.effects.sensors.potentiometer_backlash import POTENTIOMETER_BACKLASH
 from pma_gym.effects.sensors.sensor_delay import SENSOR_DELAYS
 from pma_gym.effects.sensors.sensor_errors import (
@@ -182,8 +184,18 @@ CATALOGUE: dict[str, Effect] = {
         FORCE_SENSOR,
         FORCE_SENSOR_ERROR,
         *SENSOR_DELAYS,
+        PULLEY,
+        LEVER,
+        JOINT_RANGE,
     )
 }
 """Effects by name, in the order in which plants sum them."""
+
+CATALOGUE |= {
+    second.name: second
+    for effect in CATALOGUE.values()
+    if effect.port in SECOND_PORTS
+    for second in (antagonist(effect),)
+}
 
 __all__ = ["CATALOGUE", "Effect"]

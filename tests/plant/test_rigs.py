@@ -14,6 +14,7 @@ from pma_gym.plant.model import ModelError
 from pma_gym.plant.rigs import RIGS
 from tests.plant.test_imposed import imposed
 from tests.plant.test_joint import joint
+from tests.plant.test_muscle_joint import one_muscle
 
 ROOT = Path(__file__).parents[2]
 MODELS = {
@@ -22,6 +23,8 @@ MODELS = {
     "joint": joint(torque_drive=True),
     "imposed": imposed(),
     "slide": str(ROOT / "tests/discovery/rigs/driven_slide/model.toml"),
+    "muscle_joint": one_muscle(),
+    "muscle_pair": "muscle_pair",
 }
 """A model of every rig, by the rig's name."""
 
@@ -32,6 +35,11 @@ FIRST = {
     "joint": Trial(np.arange(3) * 0.01, {"torque_command": np.full(3, 0.1)}),
     "imposed": Trial(np.arange(3) * 0.01, {"contraction_command": np.full(3, 0.01)}),
     "slide": Trial(np.arange(3) * 0.01, {"load_command": np.full(3, 1.0)}),
+    "muscle_joint": Trial(np.arange(3) * 0.01, {"pressure_command": np.full(3, 2e5)}),
+    "muscle_pair": Trial(
+        np.arange(3) * 0.01,
+        {"pressure_command": np.full(3, 2e5), "antagonist_pressure_command": np.full(3, 1e5)},
+    ),
 }
 """A trial of every rig."""
 
@@ -101,6 +109,6 @@ def test_at_most_ten_comparisons_name_a_signal(compared):
 
 def test_an_unknown_rig_is_refused_with_those_there_are():
     model = load_model("station")
-    known = "station, cascade, slide, joint, imposed"
+    known = ", ".join(RIGS)
     with pytest.raises(ModelError, match=f"one of {known}, got 'lift'"):
         type(model)("m", "m", "lift", dict(model.parameters))
