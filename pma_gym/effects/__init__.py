@@ -63,11 +63,15 @@ from pma_gym.effects.muscle.repperger import REPPERGER_DAMPING, REPPERGER_SPRING
 from pma_gym.effects.muscle.sarosi import SAROSI_FORCE
 from pma_gym.effects.muscle.stiffness import STIFFNESS
 from pma_gym.effects.muscle.warm_up import WARM_UP
+from pma_gym.effects.regulator.air_chamber import AIR_CHAMBER, LEAK, SUPPLY
+from pma_gym.effects.regulator.co_contraction import CO_CONTRACTION
 from pma_gym.effects.regulator.filling import FILLING
 from pma_gym.effects.regulator.regulator import REGULATOR_LAG, REGULATOR_LINE
 from pma_gym.effects.regulator.regulator_asymmetry import REGULATOR_ASYMMETRY
 from pma_gym.effects.regulator.regulator_deadband import REGULATOR_DEADBAND
 from pma_gym.effects.regulator.regulator_rate_limit import REGULATOR_RATE_LIMIT
+from pma_gym.effects.regulator.regulator_second_order import REGULATOR_SECOND_ORDER
+from pma_gym.effects.regulator.valve import AIR_VALVES
 from pma_gym.effects.residual_law import (
     RESIDUAL_FORCE_OF_CONTRACTION,
     RESIDUAL_FORCE_OF_PRESSURE,
@@ -187,6 +191,12 @@ CATALOGUE: dict[str, Effect] = {
         PULLEY,
         LEVER,
         JOINT_RANGE,
+        CO_CONTRACTION,
+        REGULATOR_SECOND_ORDER,
+        AIR_CHAMBER,
+        LEAK,
+        *AIR_VALVES,
+        SUPPLY,
     )
 }
 """Effects by name, in the order in which plants sum them."""

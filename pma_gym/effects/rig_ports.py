@@ -115,6 +115,7 @@ IMPOSED_PORTS: dict[str, Port] = {
 """Ports of the imposed motion, with the number of effects and the use of their results."""
 
 _AIR = ("pressure", "pressure_asked", "pressure_command")
+_FLOWING = ("opening_asked", "opening", "air_flow")
 _PULLING = ("pressure", "contraction", "velocity")
 _AT_JOINT = ("angle", "spin")
 
@@ -124,11 +125,25 @@ _MUSCLE_PORTS: dict[str, Port] = {
     "muscle_damping": Port(
         "damping coefficient of the muscle (N s/m), added", signals=_PULLING, absent=0.0
     ),
-    "regulator_line": Port("pressure that the regulator settles at (Pa)", least=1, most=1),
+    "regulator_line": Port("pressure that is asked for (Pa)", most=1),
     "regulator_delay": STATION_PORTS["regulator_delay"],
     "regulator_lag": Port("rate of the pressure (Pa/s)", least=1, most=1),
     "regulator_pace": STATION_PORTS["regulator_pace"],
     "chamber": STATION_PORTS["chamber"],
+    "valve_drive": Port("opening that is asked of the valve, -1 to 1", most=1),
+    "valve_delay": Port(
+        "opening that has reached the muscle", 0, 1, (), ("opening_asked",), "opening_asked"
+    ),
+    "valve_shape": Port(
+        "that opening, changed by one effect after the other",
+        signals=("opening", "pressure"),
+        absent="opening",
+    ),
+    "air_flow": Port(
+        "mass flow of air into the muscle (kg/s), added",
+        signals=("opening", "pressure", "contraction"),
+        absent=0.0,
+    ),
 }
 
 SECOND_PORTS: tuple[str, ...] = (
@@ -142,12 +157,14 @@ MUSCLE_JOINT_PORTS: dict[str, Port] = {
     **_MUSCLE_PORTS,
     "joint_drive": Port("torque of a drive or motor beside the muscle (N m)", most=1),
     **{name: JOINT_PORTS[name] for name in ("joint_drive_loss", "joint_load", "joint_torque")},
+    "supply": Port("gauge pressure of the tank (Pa)", most=1),
 }
 """Ports of a joint that a muscle turns, with the number of effects and the use of their results."""
 
 MUSCLE_PAIR_PORTS: dict[str, Port] = {
     **MUSCLE_JOINT_PORTS,
     **{f"{ANTAGONIST}{name}": port for name, port in _MUSCLE_PORTS.items()},
+    "co_contraction": Port("pressures that are asked of both muscles (Pa)", most=1),
 }
 """Ports of a joint that two muscles turn, with the number of effects and the use of their results.
 
@@ -164,7 +181,7 @@ RATE_SIGNALS: dict[str, tuple[str, ...]] = {
     "joint": (*_CARRYING, "motor_voltage", "load_asked", "load_command"),
     "imposed": (*_MOVED, "pressure_asked", "pressure_command"),
     "cascade": (*_AIR, "regulator_voltage"),
-    **dict.fromkeys(("muscle_joint", "muscle_pair"), (*_CARRYING, "contraction", *_AIR)),
+    **dict.fromkeys(("muscle_joint", "muscle_pair"), (*_CARRYING, "contraction", *_AIR, *_FLOWING)),
 }
 """Signals that rate laws may read, by rig."""
 

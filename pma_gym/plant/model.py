@@ -409,6 +409,12 @@ def _check_ports(model: Model) -> None:
             raise ModelError(f"a {rig.name} needs [{part}]; {where}")
     for name, port in rig.ports.items():
         _check_port(model, name, port)
+    for effect, others in rig.companions:
+        if effect in model.parameters and not model.parameters.keys() & set(others):
+            raise ModelError(
+                f"[{effect}] of a {rig.name} needs [{'] or ['.join(others)}] beside it; add that, "
+                f"or leave [{effect}] out"
+            )
     taking = [each for each in rig.commands if each.effect in model.parameters]
     for one, other in itertools.combinations(taking, 2):
         if one.slot == other.slot:

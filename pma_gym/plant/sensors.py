@@ -14,7 +14,7 @@ from pma_gym.effects.contact.imposed_motion import following_rate
 from pma_gym.effects.effect import Parameters
 from pma_gym.plant.imposed_motion import level_command, motion_command
 from pma_gym.plant.model import Model
-from pma_gym.plant.rigs.rig import Command
+from pma_gym.plant.rigs.rig import TakenCommand
 from pma_gym.units import SI_FACTORS
 
 _ROUNDING = 1e-9
@@ -140,7 +140,7 @@ def voltages(model: Model, trial: Trial) -> tuple[np.ndarray, np.ndarray]:
     return motor, _voltage(trial, "regulator_voltage", "pressure_command", line)
 
 
-def active_commands(model: Model) -> tuple[Command | None, Command | None]:
+def active_commands(model: Model) -> tuple[TakenCommand | None, TakenCommand | None]:
     """Commands that a model's effects take, for the motor's and the regulator's place."""
     active = {each.slot: each for each in model.rig.commands if each.effect in model.parameters}
     return active.get(0), active.get(1)
@@ -151,7 +151,10 @@ def _slots(model: Model, trial: Trial) -> tuple[np.ndarray, np.ndarray]:
     first, second = (
         np.zeros(len(trial.time))
         if command is None
-        else _voltage(trial, command.name, command.wish, model.parameters[command.effect])
+        else _voltage(
+            *(trial, command.name, command.wish, model.parameters[command.effect]),
+            -np.inf if command.is_signed else 0.0,
+        )
         if command.wish
         else _direct(trial, command.name)
         for command in active_commands(model)

@@ -18,11 +18,12 @@ from pma_gym.codegen.trace import trace
 from pma_gym.data.signals import signals
 from pma_gym.effects.arithmetic import positive
 from pma_gym.effects.effect import ANTAGONIST
+from pma_gym.effects.regulator.valve import drawn_flow
 from pma_gym.effects.rig_ports import MUSCLE_JOINT_PORTS, MUSCLE_PAIR_PORTS
 from pma_gym.plant.composition import PlantEquations
 from pma_gym.plant.equilibrium.force_balance import roots
 from pma_gym.plant.equilibrium.problem import EquilibriumProblem
-from pma_gym.plant.rigs.rig import Command, Rig
+from pma_gym.plant.rigs.rig import Rig, TakenCommand
 from pma_gym.plant.rigs.station import TIGHTENING_M
 
 SCALES: dict[str, float] = {
@@ -47,6 +48,8 @@ def write_equations(equations: PlantEquations) -> None:
     eq.let("velocity", eq["spin"])
     eq.let("position", eq["angle"])
     eq.let("command", eq["motor_voltage"])
+    nothing = eq.graph.constant(0.0)
+    eq.let("supply_pressure", eq.one("supply") if eq.at("supply") else nothing)
     muscles = {"": 1.0}
     if eq.at(f"{ANTAGONIST}moment_arm"):
         muscles[ANTAGONIST] = -1.0
@@ -65,6 +68,11 @@ def write_equations(equations: PlantEquations) -> None:
     for prefix in muscles:
         name, rate = f"{prefix}pressure", eq.one(f"{prefix}regulator_lag")
         eq.add_decaying(name, rate, SCALES[name], f"{prefix}chamber")
+    drawn = [
+        trace(drawn_flow, *(eq.views[f"{prefix}air_flow"][n] for n in ("opening", "air_flow")))
+        for prefix in muscles
+    ]
+    eq.let("supply_flow", sum(drawn[1:], drawn[0]))
     eq.add_memories(tuple(MUSCLE_PAIR_PORTS))
     eq.add_sensors(SCALES)
     eq.add_event("turning", eq["spin"], TURNING_RAD, turning=True)
@@ -96,26 +104,49 @@ def _pull(eq: PlantEquations, prefix: str, side: float) -> Value:
 
 
 def _write_air(eq: PlantEquations, prefix: str, view: dict[str, Value]) -> None:
-    """The command on its way to the muscle."""
+    """The command on its way to the muscle, and the air that a valve lets in."""
+
+    def let(name: str, value: Value) -> None:
+        view[name] = eq.let(f"{prefix}{name}", value)
+
+    def passed(port: str, name: str) -> Value:
+        return eq.one(f"{prefix}{port}") if eq.at(f"{prefix}{port}") else view[name]
+
+    nothing = eq.graph.constant(0.0)
     view["pressure"] = eq[f"{prefix}pressure"]
     view["regulator_voltage"] = eq["motor_voltage" if prefix else "regulator_voltage"]
-    view["pressure_asked"] = eq.let(f"{prefix}pressure_asked", eq.one(f"{prefix}regulator_line"))
-    delay = f"{prefix}regulator_delay"
-    view["pressure_command"] = eq.let(
-        f"{prefix}pressure_command", eq.passed(delay, f"{prefix}pressure_asked")
-    )
+    view["valve_voltage"] = view["regulator_voltage"]
+    view["none"] = nothing
+    asked = passed("regulator_line", "none")
+    if eq.at("co_contraction"):
+        # The first muscle's line gives the mean.
+        mixed = {
+            "pressure_asked": eq.one("regulator_line"),
+            "difference_voltage": eq["motor_voltage"],
+        }
+        asked = eq.one("co_contraction", **mixed)[1 if prefix else 0]
+    let("pressure_asked", asked)
+    let("pressure_command", passed("regulator_delay", "pressure_asked"))
     (lag,) = eq.at(f"{prefix}regulator_lag")
-    view["regulator_time_constant"] = eq.parameters[lag.name].time_constant
+    view["regulator_time_constant"] = getattr(eq.parameters[lag.name], "time_constant", nothing)
     view["regulator_pace"] = eq.product(f"{prefix}regulator_pace")
+    let("opening_asked", passed("valve_drive", "none"))
+    let(
+        "opening",
+        eq.chain(f"{prefix}valve_shape", "opening", passed("valve_delay", "opening_asked")),
+    )
+    view["supply_pressure"] = eq["supply_pressure"]
+    let("air_flow", eq.total(f"{prefix}air_flow"))
 
 
 def solve_equilibrium(problem: EquilibriumProblem) -> None:
     """Set the pressures to what is asked for, and the arm to where its torques balance."""
     joint = problem.parameters("joint_range")
-    for prefix, slot in (("", 1), (ANTAGONIST, 0)):
+    for prefix in ("", ANTAGONIST):
         if f"{prefix}pressure" in problem.names:
             problem.relax_memory(f"{prefix}regulator_delay")
-            _settle_pressure(problem, prefix, problem.inputs[:, slot])
+            _settle_pressure(problem, prefix)
+            problem.relax_memory(f"{prefix}valve_delay")
     for effect in problem.plant.effects.values():
         if effect.rate_independent_law and effect.port.startswith("joint_"):
             problem[effect.memory_names[0]] = joint["arrival"]
@@ -139,18 +170,41 @@ def solve_equilibrium(problem: EquilibriumProblem) -> None:
     problem.zero[:] = problem["angle"] = np.where(outside, np.nan, angle)
 
 
-_STEADY = 1.0
-"""Rate (Pa/s) below which a pressure counts as settled."""
+_HIGHEST = 1e7
+"""Pressure (Pa) up to which a rest is looked for."""
 
 
-def _settle_pressure(problem: EquilibriumProblem, prefix: str, volts: np.ndarray) -> None:
-    """Set a pressure to what is asked for, or to where effects at the chamber let it rest."""
-    name, line = f"{prefix}pressure", problem.parameters(f"{prefix}regulator_line")
-    asked = np.maximum(line["gain"] * volts + line["offset"], 0.0)
-    problem[name] = asked
-    if np.any(np.abs(problem.rate(name)) > _STEADY):
-        problem.relax(name, about=asked)
+def _settle_pressure(problem: EquilibriumProblem, prefix: str) -> None:
+    """Set a pressure to where nothing flows, or what is shut in to its pressure at the start."""
+    name, effects = f"{prefix}pressure", problem.plant.effects
+    (lag,) = (each for each in effects.values() if each.port == f"{prefix}regulator_lag")
+    driven = lag.memory_names[0] if lag.rate else name
 
+    def rate(pressures: np.ndarray) -> np.ndarray:
+        problem[name] = pressures
+        problem.relax_memory(f"{prefix}valve_delay")
+        return problem.rate(driven)
+
+    low, high = np.zeros(len(problem.state)), np.full(len(problem.state), _HIGHEST)
+    shut = (rate(low) == 0.0) & (rate(high) == 0.0)
+    at_start = problem.parameters(lag.name).get("pressure_at_start", 0.0)
+    problem[name] = np.where(shut, at_start, roots(rate, low, high))
+
+
+def _companions(prefix: str, *mixed: str) -> tuple[tuple[str, tuple[str, ...]], ...]:
+    """Effects of a muscle that need others of it, and what gives the pressure asked of it."""
+    asking = (f"{prefix}regulator_line", *mixed)
+    return (
+        *((f"{prefix}{name}", asking) for name in _ASKED),
+        (f"{prefix}valve", ("supply",)),
+        (f"{prefix}valve", (f"{prefix}air_chamber",)),
+        (f"{prefix}valve_spool", (f"{prefix}valve",)),
+        (f"{prefix}pressure_loop", (f"{prefix}valve",)),
+    )
+
+
+_ASKED = ("regulator_lag", "regulator_second_order", "pressure_loop")
+"""Effects that follow a pressure that is asked for."""
 
 MUSCLE_JOINT = Rig(
     name="muscle_joint",
@@ -164,10 +218,12 @@ MUSCLE_JOINT = Rig(
     shipped_example="muscle_pair",
     has_muscle=False,
     inertia=("inertia", "inertia"),
+    companions=_companions(""),
     commands=(
-        Command("regulator_line", 1, "regulator_voltage", "pressure_command"),
-        Command("torque_drive", 0, "torque_command"),
-        Command("dc_motor", 0, "winding_voltage"),
+        TakenCommand("regulator_line", 1, "regulator_voltage", "pressure_command"),
+        TakenCommand("valve_spool", 1, "valve_voltage"),
+        TakenCommand("torque_drive", 0, "torque_command"),
+        TakenCommand("dc_motor", 0, "winding_voltage"),
     ),
 )
 
@@ -176,10 +232,19 @@ MUSCLE_PAIR = replace(
     name="muscle_pair",
     signals=signals("angle", "load", "pressure", "antagonist_load", "antagonist_pressure"),
     ports=MUSCLE_PAIR_PORTS,
+    companions=(
+        *_companions(""),
+        *_companions(ANTAGONIST, "co_contraction"),
+        ("co_contraction", ("regulator_line",)),
+    ),
     commands=(
         *MUSCLE_JOINT.commands,
-        Command(
+        TakenCommand(
             f"{ANTAGONIST}regulator_line", 0, "antagonist_voltage", "antagonist_pressure_command"
+        ),
+        TakenCommand(f"{ANTAGONIST}valve_spool", 0, "antagonist_valve_voltage"),
+        TakenCommand(
+            "co_contraction", 0, "difference_voltage", "pressure_difference_command", True
         ),
     ),
 )
