@@ -17,6 +17,7 @@ from pma_gym.plant.simulation import Run, simulate_all
 
 AIR = 101325.0
 PAIR, STATION = load_model("muscle_pair"), load_model("station")
+CHAMBER = CATALOGUE["air_chamber"].usual
 MUSCLES = ("", ANTAGONIST)
 REGULATED = ("regulator_line", "regulator_lag")
 VALVES = ("valve", "air_chamber", "valve_spool")
@@ -221,7 +222,7 @@ def test_mean_and_difference_are_two_pressures():
         (lambda: pair(both=("regulator_lag",)), r"\[regulator_lag\] .* needs \[regulator_line\]"),
         (
             lambda: replace(
-                STATION, parameters=STATION.parameters | {"air_chamber": pair().parameters["valve"]}
+                STATION, parameters=STATION.parameters | {"air_chamber": CHAMBER}
             ),
             r"a station cannot have \[air_chamber\]",
         ),

@@ -63,16 +63,15 @@ def write_equations(equations: PlantEquations) -> None:
     torque = torque + eq["carried_force"] + eq.total("joint_drive_loss") + eq.total("joint_torque")
     measured = [f"{prefix}{name}" for prefix in muscles for name in ("load", "pressure")]
     eq.outputs = {name: eq[name] for name in ("angle", *measured)}
+    drawn = nothing
     eq.add_state("angle", eq["spin"], SCALES["angle"])
     eq.add_state("spin", torque / eq.parameters["inertia"].inertia, SCALES["spin"])
     for prefix in muscles:
         name, rate = f"{prefix}pressure", eq.one(f"{prefix}regulator_lag")
         eq.add_decaying(name, rate, SCALES[name], f"{prefix}chamber")
-    drawn = [
-        trace(drawn_flow, *(eq.views[f"{prefix}air_flow"][n] for n in ("opening", "air_flow")))
-        for prefix in muscles
-    ]
-    eq.let("supply_flow", sum(drawn[1:], drawn[0]))
+        air = eq.views[f"{prefix}air_flow"]
+        drawn = drawn + trace(drawn_flow, air["opening"], air["air_flow"])
+    eq.let("supply_flow", drawn)
     eq.add_memories(tuple(MUSCLE_PAIR_PORTS))
     eq.add_sensors(SCALES)
     eq.add_event("turning", eq["spin"], TURNING_RAD, turning=True)
