@@ -175,9 +175,10 @@ _HIGHEST = 1e7
 
 def _settle_pressure(problem: EquilibriumProblem, prefix: str) -> None:
     """Set a pressure to where nothing flows, or what is shut in to its pressure at the start."""
-    name, effects = f"{prefix}pressure", problem.plant.effects
-    (lag,) = (each for each in effects.values() if each.port == f"{prefix}regulator_lag")
+    name, effects = f"{prefix}pressure", problem.plant.effects.values()
+    (lag,) = (each for each in effects if each.port == f"{prefix}regulator_lag")
     driven = lag.memory_names[0] if lag.rate else name
+    at_start = problem.parameters(lag.name).get("pressure_at_start")
 
     def rate(pressures: np.ndarray) -> np.ndarray:
         problem[name] = pressures
@@ -185,8 +186,12 @@ def _settle_pressure(problem: EquilibriumProblem, prefix: str) -> None:
         return problem.rate(driven)
 
     low, high = np.zeros(len(problem.state)), np.full(len(problem.state), _HIGHEST)
+    if at_start is None:
+        problem[name] = roots(rate, low, high)
+        return
+    # A leak alone would empty it before a trial begins.
     shut = (rate(low) == 0.0) & (rate(high) == 0.0)
-    at_start = problem.parameters(lag.name).get("pressure_at_start", 0.0)
+    shut |= all(each.port != f"{prefix}valve_drive" for each in effects)
     problem[name] = np.where(shut, at_start, roots(rate, low, high))
 
 
