@@ -109,7 +109,7 @@ def test_a_tank_loses_what_the_muscles_take():
     plant, time = Plant(model, 1e-6), 0.01 * np.arange(101)
     commands = {name: np.full(101, 8.0) for name in ("valve_voltage", "antagonist_valve_voltage")}
     rest = plant.settle(5.0, regulator_voltage=5.0)
-    states, _ = plant.run(time, *commands.values(), condition=rest)
+    states, _ = plant.run(time, *commands.values(), "zoh", rest)
     sag = states[-1, plant.states.index("memory_supply")]
     gained = 0.0
     for prefix, side in (("", 1.0), (ANTAGONIST, -1.0)):

@@ -131,7 +131,7 @@ def drawn_flow(opening, air_flow):
     Returns:
         Mass flow (kg/s).
     """
-    return where(opening > 0.0, air_flow, 0.0)
+    return where(opening > 0.0, 1.0, 0.0) * air_flow
 
 
 def valve_kinks(opening, pressure, supply_pressure, p):
