@@ -1,7 +1,10 @@
 """An arm that muscles turn moves as an independent integration says, and keeps its energy."""
 
 import math
+import re
+import tomllib
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,6 +13,7 @@ from scipy.integrate import solve_ivp
 from pma_gym import Plant, load_model
 from pma_gym.data.files.trial_files import read_trial, write_trial
 from pma_gym.data.trial import Trial
+from pma_gym.data.trial_columns import BY_QUANTITY
 from pma_gym.effects import CATALOGUE
 from pma_gym.effects.effect import ANTAGONIST
 from pma_gym.plant.model import Model, ModelError
@@ -205,6 +209,33 @@ def test_co_contraction_stiffens_and_the_linear_model_has_the_slopes_of_equilibr
 def test_what_a_pair_cannot_have_is_refused(tables, message):
     with pytest.raises(ModelError, match=message):
         pair(**tables)
+
+
+PAGE = (Path(__file__).parents[2] / "docs" / "muscle-labs.md").read_text(encoding="utf-8")
+FILES = dict(re.findall(r'^```python title="([^"]+)"\n(.*?)^```$', PAGE, re.MULTILINE | re.DOTALL))
+
+
+def test_the_laboratorys_page_works_as_it_stands(
+    forget_user_effects, tmp_path, monkeypatch, capsys
+):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "rubber.py").write_text(FILES["rubber.py"])
+    exec(compile(FILES["pair.py"], "pair.py", "exec"), {})
+    degrees, unit = capsys.readouterr().out.split()[:2]
+    assert 30.0 < float(degrees) < 60.0 and unit == "deg"
+    pair = load_model("my_pair.toml")
+    assert pair.parameters["antagonist_rubber"] == pair.parameters["rubber"]
+    valve = PAGE.split("```toml\n")[1].split("```")[0]
+    given = {name: CATALOGUE[name].parse(table) for name, table in tomllib.loads(valve).items()}
+    line = ("regulator_line", "regulator_lag")
+    kept = {n: p for n, p in pair.parameters.items() if n.removeprefix(ANTAGONIST) not in line}
+    seconds = {f"{ANTAGONIST}{name}": values for name, values in given.items() if name != "supply"}
+    opened = replace(pair, parameters=kept | given | seconds)
+    assert np.isfinite(Plant(opened).settle(5.0, regulator_voltage=5.0).state).all()
+    back = read_trial("logs/sine.csv").measurements
+    assert set(PAGE.split("```text\n")[1].split("\n")[0].split(",")[3:]) <= {
+        BY_QUANTITY[name].name for name in back
+    }
 
 
 def test_an_unbalanced_start_says_what_to_change():

@@ -8,7 +8,7 @@ from pma_gym.data.signals import is_pressure
 from pma_gym.effects.effect import ANTAGONIST
 from pma_gym.plant.compiled_model import CompiledModel
 from pma_gym.plant.equilibrium.force_balance import static_force
-from pma_gym.plant.equilibrium.solver import equilibrium_at
+from pma_gym.plant.equilibrium.solver import equilibria_at, equilibrium_at
 from pma_gym.plant.sensors import active_commands
 from pma_gym.plant.statics import Condition
 from pma_gym.units import SI_FACTORS
@@ -144,16 +144,22 @@ def _holding_voltage(plant: CompiledModel, regulator: float, contraction: float)
         state = equilibrium_at(plant, voltage, regulator).state
         return float(plant.observe(state[None, :], 0.0)[position.name][0]) - contraction
 
-    strongest = _strongest(plant, regulator)
-    slack, furthest = off(0.0), off(strongest)
+    least, strongest = 0.0, _strongest(plant, regulator)
+    if plant.model.rig.commands:
+        # Beyond some voltages the arm of a muscle joint leaves its range.
+        volts = np.linspace(least, strongest, 101)
+        angles = equilibria_at(plant, volts, np.full(101, regulator))[1]
+        held = volts[np.isfinite(angles)]
+        least, strongest = (held[0], held[-1]) if held.size else (least, strongest)
+    slack, furthest = off(least), off(strongest)
     if not furthest <= 0.0 < slack:
         raise ValueError(
             f"{position.name} must lie in {(furthest + contraction) / factor:.4g} to "
             f"{(slack + contraction) / factor:.4g} {position.unit} (below that at no load), what a "
-            f"motor voltage of 0 to {strongest:.4g} V holds at this pressure; got "
+            f"motor voltage of {least:g} to {strongest:.4g} V holds at this pressure; got "
             f"{contraction / factor:.4g} {position.unit}"
         )
-    return float(root_scalar(off, method="brentq", bracket=(0.0, strongest), xtol=1e-12).root)
+    return float(root_scalar(off, method="brentq", bracket=(least, strongest), xtol=1e-12).root)
 
 
 def _strongest(plant: CompiledModel, regulator: float) -> float:

@@ -221,6 +221,7 @@ MUSCLE_JOINT = Rig(
     absent_signals="it has an angle and pressures; an angle is read by [columns] as angle_deg",
     shipped_example="muscle_pair",
     has_muscle=False,
+    is_diagnosable=True,
     inertia=("inertia", "inertia"),
     companions=_companions(""),
     commands=(
