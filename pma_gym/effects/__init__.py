@@ -58,6 +58,7 @@ from pma_gym.effects.muscle.hysteresis import HYSTERESIS
 from pma_gym.effects.muscle.load_dependent_damping import LOAD_DEPENDENT_DAMPING
 from pma_gym.effects.muscle.nonlinear_stiffness import NONLINEAR_STIFFNESS
 from pma_gym.effects.muscle.passive_stretch import PASSIVE_STRETCH
+from pma_gym.effects.muscle.prandtl_ishlinskii import STOP_OPERATORS
 from pma_gym.effects.muscle.pressure_curvature import PRESSURE_CURVATURE
 from pma_gym.effects.muscle.repperger import REPPERGER_DAMPING, REPPERGER_SPRING
 from pma_gym.effects.muscle.sarosi import SAROSI_FORCE
@@ -188,6 +189,7 @@ CATALOGUE: dict[str, Effect] = {
         FORCE_SENSOR,
         FORCE_SENSOR_ERROR,
         *SENSOR_DELAYS,
+        *STOP_OPERATORS,
         PULLEY,
         LEVER,
         JOINT_RANGE,
