@@ -11,12 +11,15 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from pma_gym import Plant, load_model
+from pma_gym.cli import main
+from pma_gym.data.datasets.dataset import NamedTrial
 from pma_gym.data.files.trial_files import read_trial, write_trial
 from pma_gym.data.trial import Trial
 from pma_gym.data.trial_columns import BY_QUANTITY
+from pma_gym.discovery.preparation.prepared_trials import prepared
 from pma_gym.effects import CATALOGUE
 from pma_gym.effects.effect import ANTAGONIST
-from pma_gym.plant.model import Model, ModelError
+from pma_gym.plant.model import Model, ModelError, dump_model
 
 PAIR = load_model("muscle_pair")
 FRICTIONLESS = ("joint_friction", "hysteresis", "antagonist_hysteresis")
@@ -209,6 +212,29 @@ def test_co_contraction_stiffens_and_the_linear_model_has_the_slopes_of_equilibr
 def test_what_a_pair_cannot_have_is_refused(tables, message):
     with pytest.raises(ModelError, match=message):
         pair(**tables)
+
+
+def test_a_simulation_beyond_the_joints_range_says_so(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    rows = ["time_s,pressure_command_kpa,antagonist_pressure_command_kpa", "0,200,200", "0.5,560,1"]
+    Path("asked.csv").write_text("\n".join([*rows, "2,560,1"]))
+    narrow = PAIR.replace({"joint_range.highest_deg": 40, "joint_range.pressure_kpa": 500})
+    Path("narrow.toml").write_text(dump_model(narrow))
+    with pytest.raises(SystemExit, match="0"):
+        main(["simulate", "asked.csv", "--out", "out.csv", "--model", "narrow.toml", "--no-noise"])
+    said = " ".join(capsys.readouterr().err.split())
+    assert re.search(
+        r"angle_deg goes from .* to 5\d.*, beyond the -60 to 40 of \[joint_range\]", said
+    )
+    assert re.search(r"pressure_kpa goes from 200 to 560, beyond the 0 to 500", said)
+
+
+def test_logs_of_a_pair_keep_their_commands_in_a_diagnosis():
+    time = 0.01 * np.arange(20)
+    asked = {"pressure_command": np.full(20, 3e5), "antagonist_pressure_command": np.full(20, 2e5)}
+    trial = Plant(PAIR).simulate(Trial(time, asked))
+    ((kept, *_), _) = prepared([NamedTrial("a", trial), NamedTrial("b", trial)], PAIR)
+    assert kept.trial.commands.keys() == asked.keys()
 
 
 PAGE = (Path(__file__).parents[2] / "docs" / "muscle-labs.md").read_text(encoding="utf-8")
