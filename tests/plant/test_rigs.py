@@ -14,7 +14,6 @@ from pma_gym.plant.model import ModelError
 from pma_gym.plant.rigs import RIGS
 from tests.plant.test_imposed import imposed
 from tests.plant.test_joint import joint
-from tests.plant.test_muscle_joint import one_muscle
 
 ROOT = Path(__file__).parents[2]
 MODELS = {
@@ -23,7 +22,7 @@ MODELS = {
     "joint": joint(torque_drive=True),
     "imposed": imposed(),
     "slide": str(ROOT / "tests/discovery/rigs/driven_slide/model.toml"),
-    "muscle_joint": one_muscle(),
+    "muscle_joint": "muscle_joint",
     "muscle_pair": "muscle_pair",
 }
 """A model of every rig, by the rig's name."""
