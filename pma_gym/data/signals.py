@@ -19,6 +19,9 @@ Measured = Literal[
 VOLTAGE_RANGE = (0.0, 10.0)
 """What the motor's drive and the regulator accept (V)."""
 
+VALVE_RANGE = (-10.0, 10.0)
+"""What a proportional valve accepts (V)."""
+
 
 @dataclass(frozen=True)
 class Signal:
@@ -202,7 +205,7 @@ _ALL: tuple[Signal, ...] = (
         "command",
         "voltage",
         "command to the valve of a muscle",
-        limits=VOLTAGE_RANGE,
+        limits=VALVE_RANGE,
     ),
     Signal(
         "antagonist_valve_voltage",
@@ -210,7 +213,7 @@ _ALL: tuple[Signal, ...] = (
         "command",
         "voltage",
         "command to the valve of a second muscle",
-        limits=VOLTAGE_RANGE,
+        limits=VALVE_RANGE,
     ),
     Signal(
         "torque_command",

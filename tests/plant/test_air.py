@@ -37,11 +37,9 @@ def pair(*names, without=REGULATED, both=VALVES, **values):
 def waved(model, tolerance=2.3e-4, seconds=2.0):
     """States by name and times under waves of both voltages."""
     plant, time = Plant(model, tolerance), 0.005 * np.arange(int(200 * seconds) + 1)
-    wave = 1.5 * np.sin(3.0 * time)
-    rest = plant.settle(5.0, regulator_voltage=5.0)
-    run = Run(
-        *(time, 5.0 - wave, 5.0 + wave, "foh", plant.table, rest.state, rest.zero_contraction)
-    )
+    wave = 3.0 * np.sin(3.0 * time)
+    rest = plant.settle(0.0, regulator_voltage=0.0)
+    run = Run(*(time, -wave, wave, "foh", plant.table, rest.state, rest.zero_contraction))
     simulate_all(plant.program, [run])
     return dict(zip(plant.states, run.states.T, strict=True)), time
 
@@ -107,8 +105,8 @@ def test_a_tank_loses_what_the_muscles_take():
     supply = {"volume": 5e-3, "refill": 1e9, "share": 1.0}
     model = pair("supply", supply=supply, air_chamber=slow, antagonist_air_chamber=slow)
     plant, time = Plant(model, 1e-6), 0.01 * np.arange(101)
-    commands = {name: np.full(101, 8.0) for name in ("valve_voltage", "antagonist_valve_voltage")}
-    rest = plant.settle(5.0, regulator_voltage=5.0)
+    commands = {name: np.full(101, 6.0) for name in ("valve_voltage", "antagonist_valve_voltage")}
+    rest = plant.settle(0.0, regulator_voltage=0.0)
     states, _ = plant.run(time, *commands.values(), "zoh", rest)
     sag = states[-1, plant.states.index("memory_supply")]
     gained = 0.0

@@ -32,8 +32,8 @@ class Valve(NamedTuple):
 class ValveSpool(NamedTuple):
     """Parameters of `spool_opening`."""
 
-    middle: Annotated[float, Quantity("V", 0, 10, "assumption: 5, shut", usual=5)]
-    span: Annotated[float, Quantity("V", 0.1, 10, "assumption: 5, from shut to open", usual=5)]
+    middle: Annotated[float, Quantity("V", -10, 10, "assumption: 0, shut", usual=0)]
+    span: Annotated[float, Quantity("V", 0.1, 20, "assumption: 10, from shut to open", usual=10)]
 
 
 class PressureLoop(NamedTuple):
