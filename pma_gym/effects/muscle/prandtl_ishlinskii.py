@@ -40,8 +40,8 @@ def stop_force(memory, p):
         Force (N); positive shortens the muscle.
     Source:
         1. L. Prandtl 1928; A. Y. Ishlinskii 1944: sums of elastic elements that slip.
-        2. M. Al Janaideh, S. Rakheja and C.-Y. Su 2009, Smart Mater. Struct. 18: operators that
-           differ by direction; here the force at which they slip does.
+        2. M. Al Janaideh, S. Rakheja and C.-Y. Su 2009, Smart Materials and Structures 18:
+           operators that differ by direction; here the force at which they slip does.
     """
     return -p.force * memory
 
