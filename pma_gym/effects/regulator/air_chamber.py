@@ -98,7 +98,7 @@ def chamber_rate(pressure, contraction, velocity, air_flow, p):
     """
     volume, growth = muscle_volume(contraction, p)
     change = HEAT * air_flow - (pressure + ATMOSPHERE) * growth * velocity
-    return p.exponent * change / volume, 0.0
+    return p.exponent * change / volume, 0.0 * p.exponent
 
 
 def supply_pressure(memory, p):

@@ -23,17 +23,18 @@ class RegulatorSecondOrder(NamedTuple):
         return self.damping / (PI * self.frequency)
 
 
-def second_order_rate(memory):
+def second_order_rate(memory, p):
     """Rate of the pressure, which is the effect's own state: P' = s.
 
     Args:
         memory: rate of the pressure s (Pa/s).
+        p: RegulatorSecondOrder.
     Returns:
         (source, decay) with P' = source - decay * P.
     Source:
         Textbooks on linear systems.
     """
-    return memory, 0.0
+    return memory, 0.0 * p.damping
 
 
 def second_order_acceleration(pressure, pressure_command, regulator_pace, memory, p):

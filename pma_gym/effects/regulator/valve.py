@@ -259,7 +259,7 @@ def phase_rate(p):
     Returns:
         (source, decay) with phase' = source - decay * phase (rad/s).
     """
-    return 2.0 * PI * p.frequency, 0.0
+    return 2.0 * PI * p.frequency, 0.0 * p.frequency
 
 
 def delayed_opening(opening_asked, memory, p):
