@@ -17,7 +17,7 @@ from pma_gym.units import Quantity
 
 
 def overview() -> str:
-    """One row an effect: port, what it is, which shipped models have it."""
+    """One row an effect: port, what it is, which shipped models have it; no second muscle's."""
     rows = [
         [
             f"[{name}](#{_anchor(name)})",
@@ -26,6 +26,7 @@ def overview() -> str:
             _models_with(name),
         ]
         for name, effect in CATALOGUE.items()
+        if not effect.of
     ]
     return table(["Effect", "Port", "What", "In the shipped models"], rows)
 
@@ -38,6 +39,8 @@ def effects() -> str:
     first: dict[str, str] = {}
     parts = []
     for effect in CATALOGUE.values():
+        if effect.of:
+            continue
         module = effect.parameters.__module__
         common = sections(sys.modules[module])[""].partition("\n\n")[2]
         if common and module in first:

@@ -35,6 +35,7 @@ from pma_gym.plant.model import Model, load_model
 from pma_gym.plant.plant import Plant
 from pma_gym.tasks import broken_limit
 from pma_gym.terminal import safe_streams
+from pma_gym.units import SI_FACTORS
 
 app = StrictTyper(
     no_args_is_help=True,
@@ -181,9 +182,32 @@ def main(arguments: Sequence[str] | None = None) -> None:
             sys.exit(2)
 
 
+def _beyond_joint_range(model: Model, trial: Trial) -> list[str]:
+    """Where the arm of a muscle joint leaves its range, or a muscle its pressure."""
+    joint = model.parameters.get("joint_range")
+    if joint is None:
+        return []
+    ends = {"angle": (joint.lowest, joint.highest), "pressure": (0.0, joint.pressure)}
+    doubts = []
+    for signal in model.rig.signals:
+        low, high = ends.get(signal.measures, (-np.inf, np.inf))
+        values = trial.truth[signal.name]
+        if values.min() < low - _ROUNDING or values.max() > high + _ROUNDING:
+            numbers = np.array([values.min(), values.max(), low, high]) / SI_FACTORS[signal.unit]
+            doubts.append(
+                "{} goes from {:.4g} to {:.4g}, beyond the {:.4g} to {:.4g} of [joint_range]: a "
+                "real arm would have been stopped".format(signal.column, *numbers)
+            )
+    return doubts
+
+
+_ROUNDING = 1e-6
+"""By how much a pressure (Pa) or an angle (rad) may be beyond its range without a warning."""
+
+
 def _doubts(model: Model, trial: Trial) -> list[str]:
     """Where a simulated trial leaves what the model was identified on, or what a rig endures."""
-    doubts = []
+    doubts = _beyond_joint_range(model, trial)
     if not model.rig.has_muscle:
         # It has neither a pressure nor limits of its own.
         return doubts

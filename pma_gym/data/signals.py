@@ -19,6 +19,9 @@ Measured = Literal[
 VOLTAGE_RANGE = (0.0, 10.0)
 """What the motor's drive and the regulator accept (V)."""
 
+VALVE_RANGE = (-10.0, 10.0)
+"""What a proportional valve accepts (V)."""
+
 
 @dataclass(frozen=True)
 class Signal:
@@ -164,6 +167,55 @@ _ALL: tuple[Signal, ...] = (
         stems=("pressure command", "pressure setpoint", "set pressure"),
     ),
     Signal(
+        "antagonist_voltage",
+        "V",
+        "command",
+        "voltage",
+        "command to the pressure regulator of a second muscle",
+        limits=VOLTAGE_RANGE,
+    ),
+    Signal(
+        "antagonist_pressure_command",
+        "kPa",
+        "command",
+        "pressure",
+        "gauge pressure asked for in a second muscle, in place of its voltage",
+        voltage="antagonist_voltage",
+        measured="antagonist_pressure",
+    ),
+    Signal(
+        "difference_voltage",
+        "V",
+        "command",
+        "voltage",
+        "command of the difference between the pressures of two muscles",
+        limits=VOLTAGE_RANGE,
+    ),
+    Signal(
+        "pressure_difference_command",
+        "kPa",
+        "command",
+        "pressure",
+        "difference of pressures asked for, the first muscle's less the second's",
+        voltage="difference_voltage",
+    ),
+    Signal(
+        "valve_voltage",
+        "V",
+        "command",
+        "voltage",
+        "command to the valve of a muscle",
+        limits=VALVE_RANGE,
+    ),
+    Signal(
+        "antagonist_valve_voltage",
+        "V",
+        "command",
+        "voltage",
+        "command to the valve of a second muscle",
+        limits=VALVE_RANGE,
+    ),
+    Signal(
         "torque_command",
         "N m",
         "command",
@@ -250,6 +302,28 @@ _ALL: tuple[Signal, ...] = (
         least_rate=15e3,
         stems=("pressure", "muscle pressure", "gauge pressure"),
         words=("pressure", "druck", "p", "press"),
+    ),
+    Signal(
+        "antagonist_load",
+        "N",
+        "measurement",
+        "force",
+        "pull of a second muscle, load cell",
+        sensor="antagonist_load_cell",
+        calibration=calibration.LOAD_CELL,
+        least_span=20.0,
+        least_rate=20.0,
+    ),
+    Signal(
+        "antagonist_pressure",
+        "kPa",
+        "measurement",
+        "pressure",
+        "gauge pressure of a second muscle, transducer",
+        sensor="antagonist_pressure_transducer",
+        calibration=calibration.PRESSURE_TRANSDUCER,
+        least_span=15e3,
+        least_rate=15e3,
     ),
     Signal(
         "angle",

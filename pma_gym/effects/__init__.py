@@ -37,11 +37,12 @@ from pma_gym.effects.drive.rotor import ROTOR
 from pma_gym.effects.drive.servo import SERVO, SERVO_INERTIA
 from pma_gym.effects.drive.torque_ripple import TORQUE_RIPPLE
 from pma_gym.effects.drive.two_way_drive import TWO_WAY_DRIVE
-from pma_gym.effects.effect import Effect
+from pma_gym.effects.effect import Effect, antagonist
 from pma_gym.effects.joint.inertia import INERTIA, JOINT_START
+from pma_gym.effects.joint.moment_arm import LEVER, PULLEY
 from pma_gym.effects.joint.motor import DC_MOTOR, TORQUE_DRIVE
 from pma_gym.effects.joint.passive_torque import JOINT_DAMPING, JOINT_FRICTION, JOINT_WEIGHT
-from pma_gym.effects.limits import LIMITS, VALIDITY
+from pma_gym.effects.limits import JOINT_RANGE, LIMITS, VALIDITY
 from pma_gym.effects.muscle.colbrunn import COLBRUNN_SPRING
 from pma_gym.effects.muscle.contractile_force import CONTRACTILE_FORCE
 from pma_gym.effects.muscle.creep import CREEP, SLOW_CREEP
@@ -57,22 +58,28 @@ from pma_gym.effects.muscle.hysteresis import HYSTERESIS
 from pma_gym.effects.muscle.load_dependent_damping import LOAD_DEPENDENT_DAMPING
 from pma_gym.effects.muscle.nonlinear_stiffness import NONLINEAR_STIFFNESS
 from pma_gym.effects.muscle.passive_stretch import PASSIVE_STRETCH
+from pma_gym.effects.muscle.prandtl_ishlinskii import STOP_OPERATORS
 from pma_gym.effects.muscle.pressure_curvature import PRESSURE_CURVATURE
 from pma_gym.effects.muscle.repperger import REPPERGER_DAMPING, REPPERGER_SPRING
 from pma_gym.effects.muscle.sarosi import SAROSI_FORCE
 from pma_gym.effects.muscle.stiffness import STIFFNESS
 from pma_gym.effects.muscle.warm_up import WARM_UP
+from pma_gym.effects.regulator.air_chamber import AIR_CHAMBER, LEAK, SUPPLY
+from pma_gym.effects.regulator.co_contraction import CO_CONTRACTION
 from pma_gym.effects.regulator.filling import FILLING
 from pma_gym.effects.regulator.regulator import REGULATOR_LAG, REGULATOR_LINE
 from pma_gym.effects.regulator.regulator_asymmetry import REGULATOR_ASYMMETRY
 from pma_gym.effects.regulator.regulator_deadband import REGULATOR_DEADBAND
 from pma_gym.effects.regulator.regulator_rate_limit import REGULATOR_RATE_LIMIT
+from pma_gym.effects.regulator.regulator_second_order import REGULATOR_SECOND_ORDER
+from pma_gym.effects.regulator.valve import AIR_VALVES
 from pma_gym.effects.residual_law import (
     RESIDUAL_FORCE_OF_CONTRACTION,
     RESIDUAL_FORCE_OF_PRESSURE,
     RESIDUAL_FORCE_OF_VELOCITY,
     RESIDUAL_LOAD,
 )
+from pma_gym.effects.rig_ports import SECOND_PORTS
 from pma_gym.effects.sensors.potentiometer_backlash import POTENTIOMETER_BACKLASH
 from pma_gym.effects.sensors.sensor_delay import SENSOR_DELAYS
 from pma_gym.effects.sensors.sensor_errors import (
@@ -182,8 +189,25 @@ CATALOGUE: dict[str, Effect] = {
         FORCE_SENSOR,
         FORCE_SENSOR_ERROR,
         *SENSOR_DELAYS,
+        *STOP_OPERATORS,
+        PULLEY,
+        LEVER,
+        JOINT_RANGE,
+        CO_CONTRACTION,
+        REGULATOR_SECOND_ORDER,
+        AIR_CHAMBER,
+        LEAK,
+        *AIR_VALVES,
+        SUPPLY,
     )
 }
 """Effects by name, in the order in which plants sum them."""
+
+CATALOGUE |= {
+    second.name: second
+    for effect in CATALOGUE.values()
+    if effect.port in SECOND_PORTS
+    for second in (antagonist(effect),)
+}
 
 __all__ = ["CATALOGUE", "Effect"]

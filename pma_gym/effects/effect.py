@@ -2,7 +2,7 @@
 
 import inspect
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, cached_property
 from itertools import pairwise
 from types import MappingProxyType
@@ -65,6 +65,7 @@ class Effect:
             damping, a person, or a law of free shape. Such an effect replaces another one and is
             not added to it, so a diagnosis never proposes it as missing; compare whole models
             instead.
+        of: name of the effect that this one is at a second muscle; empty for any other.
     """
 
     name: str
@@ -86,6 +87,7 @@ class Effect:
     ties: tuple[tuple[str, ...], ...] = ()
     terms: tuple[tuple[str, ...], ...] = ()
     replaces: str = ""
+    of: str = ""
 
     @cached_property
     def quantities(self) -> dict[str, Quantity]:
@@ -265,6 +267,22 @@ class Effect:
         )
         every = (self.law, *of_memory, self.event, self.breakpoint)
         yield from (law for law in every if law is not None)
+
+
+ANTAGONIST = "antagonist_"
+"""Prefix of the effects, ports and signals of a second muscle."""
+
+
+def antagonist(effect: Effect) -> Effect:
+    """Return the effect at a second muscle: the same law with parameters and states of its own.
+
+    >>> from pma_gym.effects import CATALOGUE
+    >>> antagonist(CATALOGUE["pressure_transducer"]).port
+    'sensor:antagonist_pressure'
+    """
+    kind, colon, place = effect.port.rpartition(":")
+    names = {"name": f"{ANTAGONIST}{effect.name}", "of": effect.name}
+    return replace(effect, **names, port=f"{kind}{colon}{ANTAGONIST}{place}")
 
 
 @cache

@@ -26,5 +26,21 @@ class Validity(NamedTuple):
     highest: Annotated[float, Quantity("kPa", 0, 2000, "Serres 2008, table I3: 575", usual=575)]
 
 
+class JointRange(NamedTuple):
+    """Range of a muscle's joint, in which it is at rest, and the end of it with dry friction."""
+
+    lowest: Annotated[float, Quantity("deg", -360, 0, "assumption: -60", usual=-60)]
+    highest: Annotated[float, Quantity("deg", 0, 360, "assumption: 60", usual=60)]
+    pressure: Annotated[float, Quantity("kPa", 0, 2000, "MAS-20 rating: 600", usual=600)]
+    arrival: Annotated[
+        float,
+        Quantity(
+            *("1", -1, 1, "0: friction carries nothing; 1 or -1: it came from below or above"),
+            usual=0,
+        ),
+    ] = 0.0
+
+
 LIMITS = Effect("limits", "part", Limits)
 VALIDITY = Effect("validity", "part", Validity)
+JOINT_RANGE = Effect("joint_range", "part", JointRange)

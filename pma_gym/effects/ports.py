@@ -36,6 +36,9 @@ _RANGES = {
     "stretch": 1e-3,
     "stretch_rate": 0.05,
     "signal": 0.7,
+    "opening": 0.5,
+    "opening_asked": 0.4,
+    "air_flow": 1e-3,
 }
 
 

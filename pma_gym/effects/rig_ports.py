@@ -5,11 +5,13 @@ and a rate law all of the rig. `tests/effects/test_user_effects.py` checks these
 rigs. The zero of a slide's position is free in every trial, so no law reads it.
 """
 
-from pma_gym.effects.effect import Effect, signals
-from pma_gym.effects.ports import EVERYTHING, STATES, STATION_PORTS, Port
+from pma_gym.effects.effect import ANTAGONIST, Effect, antagonist, signals
+from pma_gym.effects.ports import EVERYTHING, SENSOR, SENSOR_DELAY, STATES, STATION_PORTS, Port
 from pma_gym.effects.sensors.sensors import (
+    ENCODER,
     FORCE_SENSOR,
     JOINT_SENSORS,
+    LOAD_CELL,
     LVDT,
     PRESSURE_TRANSDUCER,
     SENSORS,
@@ -55,6 +57,9 @@ SLIDE_PORTS: dict[str, Port] = {
     ),
 }
 """Ports of the slide, with the number of effects and the use of their results."""
+
+MUSCLE_SENSORS = (LOAD_CELL, PRESSURE_TRANSDUCER)
+"""Sensors of each muscle of a joint that muscles turn."""
 
 JOINT_PORTS: dict[str, Port] = {
     "joint_drive": Port("torque of the drive or motor (N m)", least=1, most=1),
@@ -109,6 +114,64 @@ IMPOSED_PORTS: dict[str, Port] = {
 }
 """Ports of the imposed motion, with the number of effects and the use of their results."""
 
+_AIR = ("pressure", "pressure_asked", "pressure_command")
+_FLOWING = ("opening_asked", "opening", "air_flow")
+_PULLING = ("pressure", "contraction", "velocity")
+_AT_JOINT = ("angle", "spin")
+
+_MUSCLE_PORTS: dict[str, Port] = {
+    "moment_arm": Port("contraction and moment arm of the muscle (m)", least=1, most=1),
+    "muscle_force": STATION_PORTS["muscle_force"],
+    "muscle_damping": Port(
+        "damping coefficient of the muscle (N s/m), added", signals=_PULLING, absent=0.0
+    ),
+    "regulator_line": Port("pressure that is asked for (Pa)", most=1),
+    "regulator_delay": STATION_PORTS["regulator_delay"],
+    "regulator_lag": Port("rate of the pressure (Pa/s)", least=1, most=1),
+    "regulator_pace": STATION_PORTS["regulator_pace"],
+    "chamber": STATION_PORTS["chamber"],
+    "valve_drive": Port("opening that is asked of the valve, -1 to 1", most=1),
+    "valve_delay": Port(
+        "opening that has reached the muscle", 0, 1, (), ("opening_asked",), "opening_asked"
+    ),
+    "valve_shape": Port(
+        "that opening, changed by one effect after the other",
+        signals=("opening", "pressure"),
+        absent="opening",
+    ),
+    "air_flow": Port(
+        "mass flow of air into the muscle (kg/s), added",
+        signals=("opening", "pressure", "contraction"),
+        absent=0.0,
+    ),
+}
+
+SECOND_PORTS: tuple[str, ...] = (
+    *_MUSCLE_PORTS,
+    *(sensor.port for sensor in MUSCLE_SENSORS),
+    *(sensor.port.replace(SENSOR, SENSOR_DELAY) for sensor in MUSCLE_SENSORS),
+)
+"""Ports that a second muscle has too, with the prefix `ANTAGONIST`."""
+
+MUSCLE_JOINT_PORTS: dict[str, Port] = {
+    **_MUSCLE_PORTS,
+    "joint_drive": Port("torque of a drive or motor beside the muscle (N m)", most=1),
+    **{name: JOINT_PORTS[name] for name in ("joint_drive_loss", "joint_load", "joint_torque")},
+    "supply": Port("gauge pressure of the tank (Pa)", most=1),
+}
+"""Ports of a joint that a muscle turns, with the number of effects and the use of their results."""
+
+MUSCLE_PAIR_PORTS: dict[str, Port] = {
+    **MUSCLE_JOINT_PORTS,
+    **{f"{ANTAGONIST}{name}": port for name, port in _MUSCLE_PORTS.items()},
+    "co_contraction": Port("pressures that are asked of both muscles (Pa)", most=1),
+}
+"""Ports of a joint that two muscles turn, with the number of effects and the use of their results.
+
+A law at a port of the second muscle reads that muscle's pressure, contraction and velocity, and an
+angle that grows as it shortens.
+"""
+
 RATE_SIGNALS: dict[str, tuple[str, ...]] = {
     "station": EVERYTHING,
     "slide": (
@@ -117,7 +180,8 @@ RATE_SIGNALS: dict[str, tuple[str, ...]] = {
     ),
     "joint": (*_CARRYING, "motor_voltage", "load_asked", "load_command"),
     "imposed": (*_MOVED, "pressure_asked", "pressure_command"),
-    "cascade": ("pressure", "pressure_asked", "pressure_command", "regulator_voltage"),
+    "cascade": (*_AIR, "regulator_voltage"),
+    **dict.fromkeys(("muscle_joint", "muscle_pair"), (*_CARRYING, "contraction", *_AIR, *_FLOWING)),
 }
 """Signals that rate laws may read, by rig."""
 
@@ -140,6 +204,12 @@ OPEN_PORTS: dict[str, dict[str, Port]] = {
         ("pressure",),
     ),
     "imposed": _with_sensors(IMPOSED_PORTS, (LVDT, FORCE_SENSOR, PRESSURE_TRANSDUCER), _MOVED),
+    "muscle_joint": _with_sensors(MUSCLE_JOINT_PORTS, (ENCODER, *MUSCLE_SENSORS), _AT_JOINT),
+    "muscle_pair": _with_sensors(
+        MUSCLE_PAIR_PORTS,
+        (ENCODER, *MUSCLE_SENSORS, *map(antagonist, MUSCLE_SENSORS)),
+        _AT_JOINT,
+    ),
 }
 """Ports where users can add effects, by rig."""
 

@@ -33,6 +33,8 @@ from types import ModuleType
 from typing import NamedTuple
 
 from pma_gym.effects import CATALOGUE, Effect
+from pma_gym.effects.effect import antagonist
+from pma_gym.effects.rig_ports import SECOND_PORTS
 from pma_gym.effects.user_effect_checks import broken_rule, numbers
 from pma_gym.files import as_path
 
@@ -87,7 +89,7 @@ def load_effects(path: str | Path) -> list[Effect]:
     known = [name for name, source in _sources.items() if source.path == path]
     if known and all(_sources[name].text == text for name in known):
         _add_to_environment(path)
-        return [CATALOGUE[name] for name in known]
+        return [CATALOGUE[name] for name in known if not CATALOGUE[name].of]
     module = _run(path, text)
     effects = _defined(module)
     if not effects:
@@ -97,9 +99,10 @@ def load_effects(path: str | Path) -> list[Effect]:
         )
     for i, effect in enumerate(effects):
         _check(path, module, effect, [other.name for other in effects[:i]])
-    for name in {*known} - {effect.name for effect in effects}:
+    second = [antagonist(effect) for effect in effects if effect.port in SECOND_PORTS]
+    for name in {*known} - {effect.name for effect in (*effects, *second)}:
         del CATALOGUE[name], _sources[name]
-    for effect in effects:
+    for effect in (*effects, *second):
         CATALOGUE[effect.name] = effect
         _sources[effect.name] = _Source(path, text, _digest(effect, text))
     _add_to_environment(path)

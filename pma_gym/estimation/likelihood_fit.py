@@ -166,7 +166,7 @@ def fit(
     x, damping, p = within(origin), 1e-3, len(coordinates)
     best = float(valued([x])[0][0])
     information, scores = np.eye(p), np.zeros((BLOCKS, p))
-    # A start whose filter fails has no slopes to go by: it stays, and is less likely than any other.
+    # A start whose filter fails has no slopes to go by: it is less likely than any other.
     for _ in range(MOST_ITERATIONS if np.isfinite(best) else 0):
         signs = np.where(within(x + STEP) > x, STEP, -STEP)
         _, results = valued([x, *(x + np.diag(signs))])

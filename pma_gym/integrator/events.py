@@ -90,7 +90,7 @@ def predict_event(
         considered.append((way, speed, graph.constant(is_event, "truth")))
 
     for event in eq.events:
-        value, (rate,) = event.value, substitute([event.rate], begin)
+        value, rate = substitute([event.value, event.rate], begin)
         coming = (value * rate < 0.0) & (abs(value) > event.overshoot)
         if event.turning:
             coming = (value * rate < 0.0) & ~turns(event, value, rate)
@@ -163,8 +163,7 @@ def locate_event(
     for event in eq.events:
         at_end, at_start, speed = (
             *substitute([event.value], {**frozen, **moved}),
-            event.value,
-            *substitute([event.rate], {**frozen, **here}),
+            *substitute([event.value, event.rate], {**frozen, **here}),
         )
         if event.turning:
             sign = frozen[eq["direction"].id]

@@ -32,6 +32,9 @@ class PlantEquations(Equations):
 
     Attributes:
         effects: the model's effects by name.
+        views: values that laws read under the name of a signal in place of it, keyed by the port of
+            their effects: those of the muscle that has the port. With `travel`, `direction` and
+            `arm` (per travel of the rig) a memory counts the muscle's way.
     """
 
     def __init__(
@@ -43,6 +46,7 @@ class PlantEquations(Equations):
     ) -> None:
         super().__init__(parameters, interpolation, graph)
         self.effects = dict(effects)
+        self.views: dict[str, dict[str, Value]] = {}
 
     def at(self, port: str) -> list[Effect]:
         """The model's effects at a port, in catalogue order."""
@@ -50,7 +54,7 @@ class PlantEquations(Equations):
 
     def call(self, effect: Effect, law: Callable, **other: Value) -> Any:  # noqa: ANN401
         """Return the value of a law; `other` replaces signals by other values."""
-        own = {"p": self.parameters[effect.name], **other}
+        own = {"p": self.parameters[effect.name], **self.views.get(effect.port, {}), **other}
 
         def signal(name: str) -> Value:
             if name in own:
@@ -74,14 +78,16 @@ class PlantEquations(Equations):
         start, parameters = self[name], self.parameters[effect.name]
         direction = self["direction"]
         self.travel = self.travelled[0] - self["origin"]
+        view = self.views.get(effect.port, {})
         inputs = {"memory": start, "travel": self._travel_of(effect), "direction": direction}
+        inputs |= {name: view[name] for name in inputs.keys() & view.keys()}
         law = effect.rate_independent_law
         after = trace(law, *({**inputs, "p": parameters}[name] for name in signals(law)))
         state = RateIndependentState(name, start, after, effect.memory_scale)
         self.rate_independent_states.append(state)
         if effect.path_breakpoint:
-            distance = trace(effect.path_breakpoint, start, direction, parameters)
-            self.path_breakpoints.append(distance)
+            distance = trace(effect.path_breakpoint, start, inputs["direction"], parameters)
+            self.path_breakpoints.append(distance / view["arm"] if "arm" in view else distance)
         return after
 
     def _travel_of(self, effect: Effect) -> Value:

@@ -1,6 +1,7 @@
 """Models: a plant's effects with their parameters, read from and written to TOML files."""
 
 import difflib
+import itertools
 import reprlib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -408,6 +409,19 @@ def _check_ports(model: Model) -> None:
             raise ModelError(f"a {rig.name} needs [{part}]; {where}")
     for name, port in rig.ports.items():
         _check_port(model, name, port)
+    for effect, others in rig.companions:
+        if effect in model.parameters and not model.parameters.keys() & set(others):
+            raise ModelError(
+                f"[{effect}] of a {rig.name} needs [{'] or ['.join(others)}] beside it; add that, "
+                f"or leave [{effect}] out"
+            )
+    taking = [each for each in rig.commands if each.effect in model.parameters]
+    for one, other in itertools.combinations(taking, 2):
+        if one.slot == other.slot:
+            raise ModelError(
+                f"a {rig.name} has one place for the commands of [{one.effect}] and "
+                f"[{other.effect}]; leave one of them out"
+            )
 
 
 def _check_sensor(model: Model, effect: Effect) -> None:

@@ -14,6 +14,7 @@ from pma_gym.effects.contact.imposed_motion import following_rate
 from pma_gym.effects.effect import Parameters
 from pma_gym.plant.imposed_motion import level_command, motion_command
 from pma_gym.plant.model import Model
+from pma_gym.plant.rigs.rig import TakenCommand
 from pma_gym.units import SI_FACTORS
 
 _ROUNDING = 1e-9
@@ -124,6 +125,8 @@ def voltages(model: Model, trial: Trial) -> tuple[np.ndarray, np.ndarray]:
     """
     if model.rig.imposes_motion:
         return _imposed(model, trial)
+    if model.rig.commands:
+        return _slots(model, trial)
     direct = direct_command(model)
     if direct:
         return _direct(trial, direct), np.zeros(len(trial.time))
@@ -137,6 +140,28 @@ def voltages(model: Model, trial: Trial) -> tuple[np.ndarray, np.ndarray]:
     return motor, _voltage(trial, "regulator_voltage", "pressure_command", line)
 
 
+def active_commands(model: Model) -> tuple[TakenCommand | None, TakenCommand | None]:
+    """Commands that a model's effects take, for the motor's and the regulator's place."""
+    active = {each.slot: each for each in model.rig.commands if each.effect in model.parameters}
+    return active.get(0), active.get(1)
+
+
+def _slots(model: Model, trial: Trial) -> tuple[np.ndarray, np.ndarray]:
+    """Commands in their places; zeros where no effect takes one."""
+    first, second = (
+        np.zeros(len(trial.time))
+        if command is None
+        else _voltage(
+            *(trial, command.name, command.wish, model.parameters[command.effect]),
+            -np.inf if command.is_signed else 0.0,
+        )
+        if command.wish
+        else _direct(trial, command.name)
+        for command in active_commands(model)
+    )
+    return first, second
+
+
 def direct_command(model: Model) -> str:
     """Command in SI that a model's drive takes directly; "" if it takes a voltage."""
     commands = model.rig.direct_commands.items()
@@ -145,6 +170,10 @@ def direct_command(model: Model) -> str:
 
 def quantities(model: Model) -> frozenset[str]:
     """What trials of a model's rig hold: its signals, and commands of its drive and regulator."""
+    if model.rig.commands:
+        active = (each for each in active_commands(model) if each)
+        names = {name for each in active for name in (each.name, each.wish) if name}
+        return frozenset(names.union(model.rig.outputs))
     direct = direct_command(model)
     commands = {direct} if direct else {"motor_voltage", "load_command"}
     if model.rig.has_muscle:

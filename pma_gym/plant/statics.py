@@ -15,7 +15,7 @@ from pma_gym.effects.effect import signals
 from pma_gym.integrator.step_attempt import first_size
 from pma_gym.plant.model import Model
 from pma_gym.plant.program import FIRST_S
-from pma_gym.plant.sensors import direct_command
+from pma_gym.plant.sensors import active_commands, direct_command
 
 _HALVINGS = 48
 """Bisections of a 120 mm bracket, to below 1e-12 mm."""
@@ -114,6 +114,16 @@ def check_commands(model: Model, motor: float, regulator: float) -> None:
     if direct:
         if not math.isfinite(motor):
             raise ValueError(f"{BY_QUANTITY[direct].name} must be finite, got {motor!r}")
+        return
+    if model.rig.commands:
+        for command, value in zip(active_commands(model), (motor, regulator), strict=True):
+            if command:
+                column = BY_QUANTITY[command.name]
+                low, high = column.limits or (-math.inf, math.inf)
+                if not (math.isfinite(value) and low <= value <= high):
+                    raise ValueError(
+                        f"{column.name} must lie in {low:g} to {high:g}, got {value!r}"
+                    )
         return
     for name, voltage in (("motor", motor), ("regulator", regulator)):
         # `not <=`: NaN is out of every range.

@@ -49,8 +49,16 @@ SIGNALS = {
     "spin": (-4.0, 4.0),
     "command": (-7.0, 7.0),
     "regulator_time_constant": (0.01, 0.2),
+    "opening": (-1.0, 1.0),
+    "opening_asked": (-1.0, 1.0),
+    "valve_voltage": (-10.0, 10.0),
+    "difference_voltage": (0.0, 10.0),
+    "supply_pressure": (500e3, 700e3),
+    "air_flow": (-1e-3, 1e-3),
+    "supply_flow": (0.0, 1e-3),
 }
-LAWS = {f"{e.name}.{law.__name__}": (e, law) for e in CATALOGUE.values() for law in e.laws()}
+FIRST = [effect for effect in CATALOGUE.values() if not effect.of]
+LAWS = {f"{e.name}.{law.__name__}": (e, law) for e in FIRST for law in e.laws()}
 
 
 class Case:

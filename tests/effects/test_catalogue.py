@@ -179,6 +179,8 @@ def test_what_a_file_need_not_name_is_usual_or_absent_and_the_same_as_when_added
         ("hysteresis", {"memory_at_start": 0.0}),
         ("drive_dead_zone", {"slope": 2.0}),
         ("contact_friction", {"rise_n": 0.0, "stribeck_speed_mm_per_s": 5.0}),
+        ("joint_range", {"arrival": 0.0}),
+        ("antagonist_hysteresis", {"memory_at_start": 0.0}),
     ]
     for effect in with_defaults:
         for file_key, value in effect.defaults.items():

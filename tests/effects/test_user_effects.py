@@ -266,9 +266,12 @@ BRANCH = Effect("branch", "{port}", Branch, law, rate=rate)
 )
 
 
-@pytest.mark.parametrize(
-    ("rig", "port"), [(r, p) for r, ports in OPEN_PORTS.items() for p in ports]
-)
+PLACES = [(rig, port) for rig, ports in OPEN_PORTS.items() for port in ports]
+# The first muscle of a pair is that of a joint with one.
+PLACES = [(r, p) for r, p in PLACES if r != "muscle_pair" or p not in OPEN_PORTS["muscle_joint"]]
+
+
+@pytest.mark.parametrize(("rig", "port"), PLACES)
 def test_laws_may_know_what_the_table_says(rig, port, write):
     """Every signal at every port is one that the rig has when it gets there."""
     place, bare = OPEN_PORTS[rig][port], load_model(MODELS[rig])

@@ -22,7 +22,7 @@ GALLERY = (
         "servo_wheel",
         "tensile_test",
     ),
-    *("cylinder_seal", "band_brake", "own_effect"),
+    *("cylinder_seal", "band_brake", "antagonistic_pair", "own_effect"),
     "policy_to_onnx",
 )
 SECONDS = 400

@@ -175,3 +175,22 @@ def test_friction_rises_near_rest():
     without = force(imposed(contact_friction=FRICTION), 0.02)
     none = force(imposed(contact_friction={**FRICTION, "rise_n": 0.0}), 0.02)
     np.testing.assert_array_equal(none, without)
+
+
+@pytest.mark.parametrize("release", [0.4, 1.0])
+def test_a_stop_operator_takes_the_work_of_its_loop_and_forgets_a_minor_one(release):
+    """F (1 + r) (2 A - (1 + r) d) in a cycle of amplitude A."""
+    values = {"force_n": 10.0, "release_ratio": release, "distance_mm": 3.0, "memory_at_start": 0.0}
+    model = imposed(stop_operator=values)
+    reading = Plant(model).simulate(trial(), noise=False).truth
+    last = slice(TIME.size * 2 // 3 - 1, None)
+    work = -np.trapezoid(reading["force"][last], reading["contraction"][last])
+    amplitude = 0.5 * np.ptp(reading["contraction"][last])
+    across = (1.0 + release) * 3e-3
+    assert work == pytest.approx(10.0 * (1.0 + release) * (2.0 * amplitude - across), rel=1e-3)
+    law = CATALOGUE["stop_operator"]
+    p = law.parse(values)
+    path, way = law.rate_independent_law, 1e-3
+    there = path(0.2, way, 1.0, p)
+    assert path(path(there, -0.5 * way, -1.0, p), 0.5 * way, 1.0, p) == pytest.approx(there)
+    assert path(0.2, 1.0, 1.0, p) == 1.0 and path(0.2, -1.0, -1.0, p) == -release

@@ -61,8 +61,9 @@ def test_intervals_contain_their_values():
 
 
 def test_the_literatures_models_differ_from_serres2008_in_the_muscle_alone():
-    for name in set(SHIPPED) - {"serres2008", "station", "cascade"}:
-        model = load_model(name)
+    for model in map(load_model, set(SHIPPED) - {"serres2008", "station", "cascade"}):
+        if not model.rig.balances_loads:
+            continue
         for effect, values in model.parameters.items():
             if CATALOGUE[effect].port not in ("muscle_force", "muscle_damping"):
                 kept = values._replace(**({"contraction": 0.07} if effect == "limits" else {}))
@@ -153,7 +154,7 @@ BROKEN = {
     "no head": (GOOD.replace('plant = "station"\n', ""), "a model needs .* missing: plant"),
     "unknown plant": (
         GOOD.replace('"station"', '"rig"'),
-        "one of station, cascade, slide, joint, imposed, got 'rig'",
+        "one of station, cascade, slide, joint, imposed, .*, got 'rig'",
     ),
     "unknown effect": (
         GOOD.replace("[coulomb_friction]", "[coulomb_fricton]"),

@@ -22,6 +22,8 @@ MODELS = {
     "joint": joint(torque_drive=True),
     "imposed": imposed(),
     "slide": str(ROOT / "tests/discovery/rigs/driven_slide/model.toml"),
+    "muscle_joint": "muscle_joint",
+    "muscle_pair": "muscle_pair",
 }
 """A model of every rig, by the rig's name."""
 
@@ -32,6 +34,11 @@ FIRST = {
     "joint": Trial(np.arange(3) * 0.01, {"torque_command": np.full(3, 0.1)}),
     "imposed": Trial(np.arange(3) * 0.01, {"contraction_command": np.full(3, 0.01)}),
     "slide": Trial(np.arange(3) * 0.01, {"load_command": np.full(3, 1.0)}),
+    "muscle_joint": Trial(np.arange(3) * 0.01, {"pressure_command": np.full(3, 2e5)}),
+    "muscle_pair": Trial(
+        np.arange(3) * 0.01,
+        {"pressure_command": np.full(3, 2e5), "antagonist_pressure_command": np.full(3, 1e5)},
+    ),
 }
 """A trial of every rig."""
 
@@ -101,6 +108,6 @@ def test_at_most_ten_comparisons_name_a_signal(compared):
 
 def test_an_unknown_rig_is_refused_with_those_there_are():
     model = load_model("station")
-    known = "station, cascade, slide, joint, imposed"
+    known = ", ".join(RIGS)
     with pytest.raises(ModelError, match=f"one of {known}, got 'lift'"):
         type(model)("m", "m", "lift", dict(model.parameters))

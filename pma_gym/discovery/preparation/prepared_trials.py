@@ -57,7 +57,7 @@ def _in_volts(trial: Trial, model: Model) -> Trial:
 
     What a drive takes as it comes keeps its name.
     """
-    if model.rig.imposes_motion:
+    if model.rig.imposes_motion or model.rig.commands:
         # A record of positions is smoothed whenever a model reads it.
         return trial
     motor, regulator = sensors.voltages(model, trial)

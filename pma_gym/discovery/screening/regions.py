@@ -36,7 +36,7 @@ SPEED = Axis("speed", "speed of contraction", "mm/s")
 
 def level_axes(signals: Sequence[Signal]) -> tuple[Axis, ...]:
     """Pressure, force and position of a rig, as its signals are called."""
-    (force,) = (each.name for each in signals if each.measures == "force")
+    force, *_ = (each.name for each in signals if each.measures == "force")
     return (
         Axis("pressure", "pressure", "kPa"),
         Axis("load", force, "N"),

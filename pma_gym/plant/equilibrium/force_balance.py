@@ -145,13 +145,13 @@ def _taut_angles(problem: EquilibriumProblem, loads: np.ndarray) -> np.ndarray:
         return problem.rate("spin")
 
     furthest = extension + cable["slack"] + 2.0 * loads / cable["stiffness"]
-    return _roots(torque, extension / rotor["radius"], furthest / rotor["radius"])
+    return roots(torque, extension / rotor["radius"], furthest / rotor["radius"])
 
 
 _MOST_SECANTS = 200
 
 
-def _roots(
+def roots(
     function: Callable[[np.ndarray], np.ndarray], low: np.ndarray, high: np.ndarray
 ) -> np.ndarray:
     """Zeros of a function that falls between two ends: regula falsi that halves what stands still.

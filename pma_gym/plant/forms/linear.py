@@ -5,10 +5,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pma_gym.data.signals import is_pressure
+from pma_gym.effects.effect import ANTAGONIST
 from pma_gym.plant.compiled_model import CompiledModel
 from pma_gym.plant.equilibrium.force_balance import static_force
-from pma_gym.plant.equilibrium.solver import equilibrium_at
+from pma_gym.plant.equilibrium.solver import equilibria_at, equilibrium_at
+from pma_gym.plant.sensors import active_commands
 from pma_gym.plant.statics import Condition
+from pma_gym.units import SI_FACTORS
 
 if TYPE_CHECKING:
     import control
@@ -20,12 +23,18 @@ DIRECTIONS = {"contracting": 1.0, "relaxing": -1.0}
 _STEP, _PRESSURE_STEP, _VOLTAGE_STEP = 1e-7, 100.0, 1e-4
 """Steps of the central differences: m, rad or their rates; Pa; V."""
 
+_FOLLOWING = ("drive_delay", "drive_lag", "regulator_delay", "regulator_lag")
+"""Ports whose effects' states are part of the linear system."""
+
 _AWAY = 1e-6
 """Offset from rest (m/s, m) at which differences begin, beyond the kink of the damping."""
 
 
 def linearize(
-    plant: CompiledModel, pressure: float, contraction: float, direction: str = "relaxing"
+    plant: CompiledModel,
+    pressure: float,
+    contraction: float | None = None,
+    direction: str = "relaxing",
 ) -> "control.StateSpace":
     """Linearise the plant about the equilibrium at a pressure and a contraction.
 
@@ -36,7 +45,9 @@ def linearize(
     Args:
         plant: the plant.
         pressure: gauge pressure (Pa).
-        contraction: shortening from the resting length (m), less than without load.
+        contraction: shortening from the resting length (m), less than without load; of a joint
+            with two muscles its angle (rad), which the second one holds. None for the equilibrium
+            without a command to motor or second muscle.
         direction: `relaxing` (the motor pulls) or `contracting`.
     Returns:
         State space with named states, inputs (V) and outputs: contraction and extension (m),
@@ -67,8 +78,9 @@ def linearize_at(
     if direction not in DIRECTIONS:
         raise ValueError(f"direction must be one of {', '.join(DIRECTIONS)}, got {direction!r}")
     base = Condition(rest.state.copy(), rest.zero_contraction)
-    if "velocity" in plant.states:
-        base.state[plant.states.index("velocity")] += _AWAY * DIRECTIONS[direction]
+    speed = next((name for name in ("velocity", "spin") if name in plant.states), "")
+    if speed:
+        base.state[plant.states.index(speed)] += _AWAY * DIRECTIONS[direction]
     else:
         # The cascade's muscle shortens where its motor, or its own contraction, stands behind it.
         for name in ("servo", "free_contraction"):
@@ -85,7 +97,10 @@ def linearize_at(
         _outputs(plant, rest, kept),
         np.zeros((len(seen), len(INPUTS))),
         states=[plant.states[i] for i in kept],
-        inputs=list(INPUTS),
+        inputs=[
+            command.name if command else slot
+            for command, slot in zip(active_commands(plant.model), INPUTS, strict=True)
+        ],
         outputs=list(seen),
         name=plant.model.name,
     )
@@ -96,7 +111,7 @@ def following(plant: CompiledModel) -> tuple[str, ...]:
     return tuple(
         name
         for effect in plant.effects.values()
-        if effect.port in ("drive_delay", "drive_lag", "regulator_delay")
+        if effect.port.removeprefix(ANTAGONIST) in _FOLLOWING
         for name in effect.memory_names
     )
 
@@ -107,7 +122,7 @@ def _seen(plant: CompiledModel) -> tuple[str, ...]:
 
 
 def operating_point(
-    plant: CompiledModel, pressure: float, contraction: float
+    plant: CompiledModel, pressure: float, contraction: float | None
 ) -> tuple[Condition, tuple[float, float]]:
     """Find the condition at rest at a contraction, and the voltages that hold it.
 
@@ -115,26 +130,36 @@ def operating_point(
         ValueError: no voltage of 0-10 V holds it; with the range of possible contractions.
     """
     regulator = plant.regulator_voltage(pressure)
-    motor = _holding_voltage(plant, regulator, contraction)
+    motor = 0.0 if contraction is None else _holding_voltage(plant, regulator, contraction)
     return equilibrium_at(plant, motor, regulator), (motor, regulator)
 
 
 def _holding_voltage(plant: CompiledModel, regulator: float, contraction: float) -> float:
     from scipy.optimize import root_scalar
 
+    position = next(signal for signal in plant.signals if signal.is_position)
+    factor = SI_FACTORS[position.unit]
+
     def off(voltage: float) -> float:
         state = equilibrium_at(plant, voltage, regulator).state
-        return float(plant.observe(state[None, :], 0.0)["contraction"][0]) - contraction
+        return float(plant.observe(state[None, :], 0.0)[position.name][0]) - contraction
 
-    strongest = _strongest(plant, regulator)
-    slack, furthest = off(0.0), off(strongest)
+    least, strongest = 0.0, _strongest(plant, regulator)
+    if plant.model.rig.commands:
+        # Beyond some voltages the arm of a muscle joint leaves its range.
+        volts = np.linspace(least, strongest, 101)
+        angles = equilibria_at(plant, volts, np.full(101, regulator))[1]
+        held = volts[np.isfinite(angles)]
+        least, strongest = (held[0], held[-1]) if held.size else (least, strongest)
+    slack, furthest = off(least), off(strongest)
     if not furthest <= 0.0 < slack:
         raise ValueError(
-            f"contraction must lie in {(furthest + contraction) * 1e3:.4g} to "
-            f"{(slack + contraction) * 1e3:.4g} mm (below that at no load), what a motor voltage "
-            f"of 0 to {strongest:.4g} V holds at this pressure; got {contraction * 1e3:.4g} mm"
+            f"{position.name} must lie in {(furthest + contraction) / factor:.4g} to "
+            f"{(slack + contraction) / factor:.4g} {position.unit} (below that at no load), what a "
+            f"motor voltage of {least:g} to {strongest:.4g} V holds at this pressure; got "
+            f"{contraction / factor:.4g} {position.unit}"
         )
-    return float(root_scalar(off, method="brentq", bracket=(0.0, strongest), xtol=1e-12).root)
+    return float(root_scalar(off, method="brentq", bracket=(least, strongest), xtol=1e-12).root)
 
 
 def _strongest(plant: CompiledModel, regulator: float) -> float:

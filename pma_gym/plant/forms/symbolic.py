@@ -50,7 +50,7 @@ class Notation(PlantEquations):
 
     def __init__(self, model: Model, names: Names) -> None:
         self.graph: Any = names
-        self.effects = model.effects
+        self.effects, self.views = model.effects, {}
         inputs: Any = names.inputs
         self.parameters: dict[str, Parameters] = {
             name: inputs(name, values) for name, values in model.parameters.items()

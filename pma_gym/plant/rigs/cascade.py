@@ -18,7 +18,7 @@ from pma_gym.effects.muscle.stiffness import spring_stiffness
 from pma_gym.effects.ports import Port
 from pma_gym.plant.composition import PlantEquations
 from pma_gym.plant.equilibrium.problem import EquilibriumProblem
-from pma_gym.plant.rigs.rig import Rig
+from pma_gym.plant.rigs.rig import REFUSED_AIR, Rig
 
 PORTS: dict[str, Port] = {
     "muscle_force": Port(
@@ -39,6 +39,7 @@ PORTS: dict[str, Port] = {
 """Ports of the cascade, with the number of effects and the use of their results."""
 
 REFUSED_EFFECTS: dict[str, str] = {
+    **REFUSED_AIR,
     "repperger_damping": (
         "its damping grows with the velocity, of which a cascade knows only the sign; take "
         "[damping] or [symmetric_damping], or plant = 'station'"

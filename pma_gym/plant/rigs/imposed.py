@@ -13,10 +13,11 @@ from pma_gym.effects.contact.imposed_motion import following_rate
 from pma_gym.effects.rig_ports import IMPOSED_PORTS
 from pma_gym.plant.composition import PlantEquations
 from pma_gym.plant.equilibrium.problem import EquilibriumProblem
-from pma_gym.plant.rigs.rig import Rig
+from pma_gym.plant.rigs.rig import REFUSED_AIR, Rig
 from pma_gym.plant.rigs.station import TURNING_M
 
 REFUSED_EFFECTS: dict[str, str] = {
+    **REFUSED_AIR,
     "load_dependent_damping": "there is no cable; take [damping] or [symmetric_damping]",
     "residual_load": "there is no load beside the force that is measured",
 }

@@ -2,11 +2,36 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 from pma_gym.data.signals import Signal
 from pma_gym.effects.ports import Port
 from pma_gym.plant.composition import PlantEquations
 from pma_gym.plant.equilibrium.problem import EquilibriumProblem
+
+REFUSED_AIR: dict[str, str] = dict.fromkeys(
+    ("air_chamber", "regulator_second_order"),
+    "its regulator has a lag of first order; take [regulator_lag], or plant = 'muscle_joint'",
+)
+"""Forms of the air that rigs with a regulator of first order do not have, with the reason."""
+
+
+class TakenCommand(NamedTuple):
+    """A command that a rig takes where its model has an effect.
+
+    Attributes:
+        effect: the effect that receives it.
+        slot: its place among the commands of the equations: 0 the motor's, 1 the regulator's.
+        name: signal that a trial commands it by; what has limits ends there.
+        wish: signal that may be commanded instead, by the effect's line of gain and offset.
+        is_signed: whether that may be below 0.
+    """
+
+    effect: str
+    slot: int
+    name: str
+    wish: str = ""
+    is_signed: bool = False
 
 
 @dataclass(frozen=True)
@@ -43,6 +68,8 @@ class Rig:
         imposes_motion: whether the drive follows a record of positions and the force is an output.
         direct_commands: for each drive, the command in SI that it takes without a voltage
             calibration.
+        companions: pairs of an effect, and of effects one of which a model with it must have.
+        commands: commands by the effects that take them; empty for a motor's and a regulator's.
     """
 
     name: str
@@ -67,6 +94,8 @@ class Rig:
     moving_lags: Mapping[str, str] = field(default_factory=dict)
     start_paths: Mapping[str, str] = field(default_factory=dict)
     direct_commands: Mapping[str, str] = field(default_factory=dict)
+    commands: tuple[TakenCommand, ...] = ()
+    companions: tuple[tuple[str, tuple[str, ...]], ...] = ()
 
     @property
     def outputs(self) -> tuple[str, ...]:

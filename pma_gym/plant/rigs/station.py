@@ -16,7 +16,7 @@ from pma_gym.effects.cable.leg import leg_torque
 from pma_gym.effects.ports import STATION_PORTS
 from pma_gym.plant.composition import PlantEquations
 from pma_gym.plant.equilibrium.force_balance import solve_station
-from pma_gym.plant.rigs.rig import Rig
+from pma_gym.plant.rigs.rig import REFUSED_AIR, Rig
 
 PARTS: tuple[str, ...] = ("rotor", "slide", "limits", "validity")
 """Required effects of port `part`, which the station reads directly."""
@@ -122,6 +122,7 @@ STATION = Rig(
     position_tolerances=POSITION_TOLERANCES,
     write_equations=write_equations,
     solve_equilibrium=solve_station,
+    refused_effects=REFUSED_AIR,
     shipped_example="serres2008",
     balances_loads=True,
     is_diagnosable=True,
