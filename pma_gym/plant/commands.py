@@ -52,23 +52,37 @@ def commands(model: Model, limits: Limits | None = None) -> list[Command]:
     Raises:
         ValueError: no limits, limits of an unknown command, or limits that are no interval.
     """
-    known = dict(limits or {})
-    direct, line = direct_command(model), model.parameters.get("regulator_line")
-    drive = model.parameters.get("two_way_drive") or model.parameters.get("drive")
-    if direct:
-        lines = {direct: (COMMANDS[0], 1.0, 0.0, (-math.inf, math.inf))}
-    elif drive:
-        lines = {"load_command": (COMMANDS[0], drive.gain, drive.offset, VOLTAGE_RANGE)}
-    else:
-        lines = {"motor_voltage": (COMMANDS[0], 1.0, 0.0, VOLTAGE_RANGE)}
-    if line is not None:
-        lines["pressure_command"] = COMMANDS[1], line.gain, line.offset, VOLTAGE_RANGE
+    known, lines = dict(limits or {}), _lines(model)
     for name in known:
         if name not in lines:
             raise ValueError(
                 f"limits name {name!r}, and model {model.name} commands {', '.join(lines)}"
             )
     return [_limited(model, SIGNALS[name], *line, known.get(name)) for name, line in lines.items()]
+
+
+def _lines(model: Model) -> dict[str, tuple[str, float, float, tuple[float, float]]]:
+    """Place, gain, offset and ends of the input of every command, by its signal."""
+    endless = -math.inf, math.inf
+    taken = [each for each in getattr(model.rig, "commands", ()) if each.effect in model.parameters]
+    if taken:
+        lines = {}
+        for each in taken:
+            line, ends = model.parameters[each.effect], SIGNALS[each.name].limits or endless
+            own = (line.gain, line.offset) if each.wish else (1.0, 0.0)
+            lines[each.wish or each.name] = COMMANDS[each.slot], *own, ends
+        return lines
+    direct, line = direct_command(model), model.parameters.get("regulator_line")
+    drive = model.parameters.get("two_way_drive") or model.parameters.get("drive")
+    if direct:
+        lines = {direct: (COMMANDS[0], 1.0, 0.0, endless)}
+    elif drive:
+        lines = {"load_command": (COMMANDS[0], drive.gain, drive.offset, VOLTAGE_RANGE)}
+    else:
+        lines = {"motor_voltage": (COMMANDS[0], 1.0, 0.0, VOLTAGE_RANGE)}
+    if line is not None:
+        lines["pressure_command"] = COMMANDS[1], line.gain, line.offset, VOLTAGE_RANGE
+    return lines
 
 
 def _limited(

@@ -50,11 +50,8 @@ OPTIONS = {
     "slide": {"model": SLIDE, "span": 0.05},
 } | {model.plant: {"model": name} for name in shipped_models() for model in [load_model(name)]}
 """Options of an environment of every rig, by its name."""
-MOVED = {
-    "joint": ("inertia.inertia_kg_m2", 0.005, 0.009),
-    "slide": ("slide.mass_kg", 1.0, 3.0),
-}
-"""A parameter and a range that it is drawn from."""
+MOVED = ("inertia.inertia_kg_m2", "slide.mass_kg", "lvdt.noise_mm")
+"""Parameters that are drawn, the first that a model has."""
 
 
 @pytest.fixture(params=OPTIONS)
@@ -65,9 +62,11 @@ def options(request) -> dict:
 
 def everything(options: dict) -> dict:
     """Nearly all that an episode depends on."""
-    model = options["model"] if not isinstance(options["model"], str) else None
-    path, *ends = MOVED[model.plant] if model else ("lvdt.noise_mm", 0.01, 0.1)
-    rig = load_model(options["model"]).rig
+    model = load_model(options["model"])
+    path = next(each for each in MOVED if each in set(model.paths()))
+    effect, _, name = path.partition(".")
+    value = model.values_in_files(effect)[name]
+    ends, rig = [0.8 * value, 1.2 * value], model.rig
     return options | {
         "randomisation": {path: ends}, "reference": "random", "preview": 2, "history": 1,
         "action_delay_s": 0.04, "observation_delay_s": 0.02, "duration_s": 3.0,
@@ -103,18 +102,18 @@ def test_it_moves_as_the_plant_does(options):
     _, info = env.reset(seed=0)
     resting = env._engine.actions[0] * 0.0
     resting[:] = [env._number(f"action_{i}") for i in range(len(resting))]
-    infos, inputs = [info], []
+    infos = [info]
     generator = np.random.default_rng(1)
     for k in range(50):
         # The plant begins settled at its first commands.
         action = resting + (k > 0) * 0.3 * generator.uniform(-1.0, 1.0, len(resting))
         *_, info = env.step(action)
         infos.append(info)
-        inputs.append([env.motor_voltage, env.regulator_voltage])
-    motor, regulator = np.array([*inputs, inputs[-1]]).T
-    commands = {"motor_voltage": motor, "regulator_voltage": regulator}
-    if options["model"] is JOINT:
-        commands = {"winding_voltage": motor}
+    keys = [
+        next(k for k in info if k.startswith(f"{c.signal.name}_")) for c in env.options.commands
+    ]
+    given = np.array([[each[key] for key in keys] for each in [*infos[1:], infos[-1]]]).T
+    commands = {c.signal.name: row for c, row in zip(env.options.commands, given, strict=True)}
     trial = Trial(0.02 * np.arange(51), commands)
     made = Plant(env.options.nominal).simulate(trial, noise=False, interpolation="zoh")
     for signal in env.options.outputs:
@@ -259,7 +258,7 @@ def test_what_cannot_be_is_refused_with_the_fix(given, words):
 
 def test_parameters_are_drawn_from_ranges_or_a_covariance():
     generator = np.random.default_rng(0)
-    path, low, high = MOVED["joint"]
+    path, low, high = MOVED[0], 0.005, 0.009
     drawn = [Ranges({path: (low, high)})(JOINT, generator) for _ in range(50)]
     values = np.array([model.parameters["inertia"].inertia for model in drawn])
     assert low <= values.min() < low + 0.001 and high - 0.001 < values.max() <= high
