@@ -3,6 +3,7 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from pma_gym.data.signals import SIGNALS, VOLTAGE_RANGE, Signal
 from pma_gym.integrator.equations import COMMANDS
@@ -11,6 +12,10 @@ from pma_gym.plant.sensors import direct_command
 
 Limits = Mapping[str, Sequence[float]]
 """Lowest and highest value of commands (SI) by name."""
+
+
+Line = tuple[str, float, float, tuple[float, float]]
+"""Place of a command, gain and offset of its line, lowest and highest input."""
 
 
 @dataclass(frozen=True)
@@ -61,28 +66,37 @@ def commands(model: Model, limits: Limits | None = None) -> list[Command]:
     return [_limited(model, SIGNALS[name], *line, known.get(name)) for name, line in lines.items()]
 
 
-def _lines(model: Model) -> dict[str, tuple[str, float, float, tuple[float, float]]]:
+def _lines(model: Model) -> dict[str, Line]:
     """Place, gain, offset and ends of the input of every command, by its signal."""
     endless = -math.inf, math.inf
     taken = [each for each in getattr(model.rig, "commands", ()) if each.effect in model.parameters]
     if taken:
         lines = {}
         for each in taken:
-            line, ends = model.parameters[each.effect], SIGNALS[each.name].limits or endless
-            own = (line.gain, line.offset) if each.wish else (1.0, 0.0)
-            lines[each.wish or each.name] = COMMANDS[each.slot], *own, ends
+            place, line = COMMANDS[each.slot], model.parameters[each.effect]
+            lines[each.wish or each.name] = (
+                _line(place, line, each.is_signed)
+                if each.wish
+                else (place, 1.0, 0.0, SIGNALS[each.name].limits or endless)
+            )
         return lines
     direct, line = direct_command(model), model.parameters.get("regulator_line")
     drive = model.parameters.get("two_way_drive") or model.parameters.get("drive")
     if direct:
         lines = {direct: (COMMANDS[0], 1.0, 0.0, endless)}
     elif drive:
-        lines = {"load_command": (COMMANDS[0], drive.gain, drive.offset, VOLTAGE_RANGE)}
+        lines = {"load_command": _line(COMMANDS[0], drive, "two_way_drive" in model.parameters)}
     else:
         lines = {"motor_voltage": (COMMANDS[0], 1.0, 0.0, VOLTAGE_RANGE)}
     if line is not None:
-        lines["pressure_command"] = COMMANDS[1], line.gain, line.offset, VOLTAGE_RANGE
+        lines["pressure_command"] = _line(COMMANDS[1], line, False)
     return lines
+
+
+def _line(place: str, line: Any, is_signed: bool) -> Line:  # noqa: ANN401 - its parameters
+    low, high = VOLTAGE_RANGE
+    least = low if is_signed else max(low, -line.offset / line.gain)
+    return place, line.gain, line.offset, (least, high)
 
 
 def _limited(
