@@ -175,7 +175,15 @@ class RigEnv(RigEpisode, PMAEnv):  # type: ignore[misc]
             self._wait(self._idle)
 
     def _with_goal(self, made: Any) -> Any:  # noqa: ANN401
-        return made if type(made) is not tuple else (self._goals(made[0]), *made[1:])
+        if type(made) is not tuple:
+            return made
+        observation, reward, terminated, *rest = made
+        goals = self._goals(observation)
+        if not terminated:
+            # To the last bit what hindsight replay computes.
+            pair = goals["achieved_goal"], goals["desired_goal"]
+            reward = float(self._reward_of_goals(*pair, rest[-1]))
+        return goals, reward, terminated, *rest
 
     def _goals(self, observation: NDArray[np.float32]) -> Any:  # noqa: ANN401
         unit = self.task.schedule.suffix
