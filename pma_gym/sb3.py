@@ -202,12 +202,12 @@ class SB3VecEnv(EngineVecEnv):
     def __init__(self, num_envs: int, task: str | Task = "displacement", **options: Any) -> None:
         """Make the environments."""
         check_known("option", [name for name in options if name == "autoreset_mode"], ())
-        batch = _Batch
+        batch = self._batch()
         if is_id(task):
             self.spec, options = registered(task, options)
             if _entry(self.spec) in (RigEnv, RigVectorEnv):
                 batch = _RigBatch
-            task = options.pop("task", "displacement" if batch is _Batch else None)
+            task = options.pop("task", None if batch is _RigBatch else "displacement")
         self.envs = batch(num_envs, task, autoreset_mode=AutoresetMode.SAME_STEP, **options)
         self.envs.spec = self.spec
         super().__init__(
@@ -220,6 +220,9 @@ class SB3VecEnv(EngineVecEnv):
         self._returns = np.zeros(num_envs)
         self._lengths = np.zeros(num_envs, np.int64)
         self._made = time.time()
+
+    def _batch(self) -> "type[_InfosByNumber]":
+        return _Batch
 
     def reset(self) -> VecEnvObs:
         """Begin an episode in every environment, with the values of `seed` and `set_options`."""
@@ -277,6 +280,13 @@ class SB3VecEnv(EngineVecEnv):
             infos[i] = info
             self._returns[i], self._lengths[i] = 0.0, 0
         return observations, rewards.astype(np.float32), over, infos
+
+
+class SB3RigVecEnv(SB3VecEnv):
+    """`RigVectorEnv` as a VecEnv: tasks and options are those of `RigEnv`."""
+
+    def _batch(self) -> "type[_InfosByNumber]":
+        return _RigBatch
 
 
 class _InfosByNumber(PMAVectorEnv):

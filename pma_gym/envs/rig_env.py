@@ -32,7 +32,9 @@ class RigInfo:
     Attributes:
         model: the nominal model, also if every reset draws another plant.
         task: the task, with its schedule.
+        signals: names of what its sensors measure.
         commands: the rig's commands with their limits.
+        rest: commands (SI) with which an episode begins at rest.
         period: duration of a control step (s).
         action_delay: delay of a command to the rig (s), whole periods.
         observation_delay: age of a measurement when the controller receives it (s).
@@ -40,7 +42,9 @@ class RigInfo:
 
     model: Model
     task: Task
+    signals: list[str]
     commands: list[Command]
+    rest: list[float]
     period: float
     action_delay: float = 0.0
     observation_delay: float = 0.0
@@ -77,11 +81,13 @@ class RigEpisode(Episode):
     @property
     def station(self) -> RigInfo:  # type: ignore[override]
         """Data of the rig for controllers, in copies."""
-        options = self.options
+        options, rest = self.options, self.options.resting()
         return RigInfo(
             copy.copy(options.nominal),
             self._detached_task,
+            [signal.name for signal in options.signals],
             options.commands,
+            [c.gain * rest[c.place] + c.offset for c in options.commands],
             options.period,
             options.action_delay * options.period,
             options.observation_delay * options.period,
