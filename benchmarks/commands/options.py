@@ -94,5 +94,11 @@ ExecutorOption = Annotated[
     ExecutorName,
     typer.Option("--executor", help="Here, or at RAY_ADDRESS."),
 ]
+EnvironmentOption = Annotated[
+    str,
+    typer.Option(
+        help="With --model: the environment's options, as TOML or its file: 'span = 0.5'."
+    ),
+]
 LOCAL = ExecutorName.LOCAL
 Recompute = Annotated[bool, typer.Option("--recompute", help="Compute anew what other code made.")]
