@@ -118,7 +118,8 @@ class RigPolicy(RigController):
         """Read the weights."""
         env = RigEnv(**{**options, **SEES})
         self._policy = _learner(env, 0).policy
-        self._policy.load_state_dict(load_from_zip_file(file, load_data=False)[1]["policy"])
+        _, weights, _ = load_from_zip_file(file, load_data=False)
+        self._policy.load_state_dict(weights["policy"])  # type: ignore[arg-type]
         self._policy.set_training_mode(False)
 
     def reset(self, info: RigInfo) -> None:

@@ -62,7 +62,7 @@ def linear_rig(info: RigInfo, rig: NominalRig, lever: Lever) -> tuple[Array, Arr
     n = len(kept)
     whole = np.zeros((n + 1, n + 1))
     whole[:n, :n], whole[:n, n] = np.transpose(slopes), b
-    step = expm(whole * info.period)
+    step = np.asarray(expm(whole * info.period), float)
     return step[:n, :n], step[:n, n], np.transpose(outputs)
 
 

@@ -1,8 +1,8 @@
 """What a controller of any rig has, and the lever by which it moves the task's signal."""
 
-from abc import abstractmethod
+from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from typing import ClassVar, NamedTuple, Protocol
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,7 +27,7 @@ class Reading(NamedTuple):
     time: float
 
 
-class RigController(Protocol):
+class RigController(ABC):
     """A controller of any rig; its settings are positive numbers, found by a search.
 
     Attributes:
