@@ -96,9 +96,7 @@ ExecutorOption = Annotated[
 ]
 EnvironmentOption = Annotated[
     str,
-    typer.Option(
-        help="With --model: the environment's options, as TOML or its file: 'span = 0.5'."
-    ),
+    typer.Option(help="With --model: options as TOML, or its file."),
 ]
 LOCAL = ExecutorName.LOCAL
 Recompute = Annotated[bool, typer.Option("--recompute", help="Compute anew what other code made.")]

@@ -58,7 +58,7 @@ def targets(
 )
 def run(
     suite: Annotated[
-        str, typer.Option(help="Name, see `suites`, or path of a TOML file; else give --model.")
+        str, typer.Option(help="Name, see `suites`, or TOML file; or give --model.")
     ] = "",
     controllers: Annotated[
         str, typer.Option(help="Names or path/to/file.py:ClassName, by commas; or all.")
@@ -79,9 +79,9 @@ def run(
     ] = None,
     model: Annotated[str, typer.Option(help="In place of a suite: any rig's model.")] = "",
     environment: EnvironmentOption = "",
-    seeds: Annotated[int, typer.Option(min=1, help="With --model: episodes of each task.")] = 10,
+    seeds: Annotated[int, typer.Option(min=1, help="Episodes of a task of --model.")] = 10,
 ) -> None:
-    """Compare controllers on a frozen suite or on a rig's model; a run goes on where it stopped."""
+    """Compare controllers on a suite or a rig's model; a stopped run goes on."""
     if model:
         from benchmarks.rigs.run import run_rig
 

@@ -104,7 +104,7 @@ def tune(
                 [], rig_options(model, environment), listed(tasks), folder, progress
             )
         for name, (controller, _) in made.items():
-            print(f"{name}: {controller.given or 'no settings'}")
+            print(f"{name}: {controller.chosen or 'no settings'}")
         print(f"Kept in {folder}, where `run --model {model}` takes them from")
         return
     from benchmarks.tuning.tune import GAINS_FILE, TuneError, run_tune

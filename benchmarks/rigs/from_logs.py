@@ -99,7 +99,7 @@ def logged_options(dataset: Dataset, model: Model) -> dict[str, Any]:
 
 def run_from_logs(
     logs: Path,
-    given: str | None,
+    initial_model: str | None,
     diagnosis: Path,
     out: Path,
     progress: Progress,
@@ -111,7 +111,7 @@ def run_from_logs(
 
     Args:
         logs: data set.
-        given: name or file of the model as it was given; that of the data set if None.
+        initial_model: name or file of the model as it was given; that of the data set if None.
         diagnosis: folder of the diagnosis.
         out: folder of the results.
         progress: shows how far it is.
@@ -119,7 +119,7 @@ def run_from_logs(
     """
     dataset = read_dataset(logs)
     better, uncertainty = amended(diagnosis)
-    start = load_model(given or dataset.model or better)
+    start = load_model(initial_model or dataset.model or better)
     document = json.loads((diagnosis / "diagnosis.json").read_text(encoding="utf-8"))
     models = {"amended": better, "given": with_noise(start, document["floors"])}
     options = logged_options(dataset, better)

@@ -14,7 +14,7 @@ from stable_baselines3.common.save_util import load_from_zip_file
 from stable_baselines3.common.utils import LinearSchedule
 
 from benchmarks.files import write_text
-from controllers.rigs import Reading, RigController
+from controllers.rigs import RigController, RigMeasurement
 from pma_gym.envs import RigEnv, RigInfo
 from pma_gym.sb3 import SB3RigVecEnv
 from pma_gym.tasks import KINDS
@@ -66,7 +66,7 @@ def train(
     options: Mapping[str, Any],
     signal: str,
     file: Path,
-    told: Callable[[int, int], None] = lambda done, total: None,
+    on_progress: Callable[[int, int], None] = lambda done, total: None,
     steps: int = STEPS,
     seed: int = 0,
 ) -> None:
@@ -76,7 +76,7 @@ def train(
         options: of the environment, whose randomisation makes the policy robust.
         signal: what is to follow.
         file: where the policy is kept, `.zip`; how far it is stands beside it, `.json`.
-        told: called with the control steps made and their number.
+        on_progress: called with the control steps made and their number.
         steps: control steps in all.
         seed: of everything random.
     """
@@ -101,7 +101,7 @@ def train(
             file.parent.mkdir(parents=True, exist_ok=True)
             model.save(file)
             write_text(progress, json.dumps({"steps": model.num_timesteps}) + "\n")
-            told(min(model.num_timesteps, steps), steps)
+            on_progress(min(model.num_timesteps, steps), steps)
 
 
 class RigPolicy(RigController):
@@ -126,8 +126,8 @@ class RigPolicy(RigController):
         """Remember the limits of the commands."""
         self._low, self._high = np.array([command.limits for command in info.commands]).T
 
-    def act(self, reading: Reading) -> Sequence[float]:
+    def act(self, measurement: RigMeasurement) -> Sequence[float]:
         """Commands (SI)."""
-        action, _ = self._policy.predict(reading.observation, deterministic=True)
+        action, _ = self._policy.predict(measurement.observation, deterministic=True)
         share = 0.5 * (np.clip(action, -1.0, 1.0) + 1.0)
         return (self._low + share * (self._high - self._low)).tolist()

@@ -39,7 +39,7 @@ def varied(model: Model) -> dict[str, list[float]]:
 
 def rig_options(model: str, environment: str) -> dict[str, Any]:
     """Options of the environment: of a TOML text or file, drawn parameters if it names none."""
-    given = (
+    table = (
         read_toml(Path(environment))
         if environment.endswith(".toml")
         else tomllib.loads(environment)
@@ -48,7 +48,7 @@ def rig_options(model: str, environment: str) -> dict[str, Any]:
     drawn = (
         "intervals" if any(note.low is not None for note in known.notes.values()) else varied(known)
     )
-    return {"model": known, "randomisation": drawn, **given}
+    return {"model": known, "randomisation": drawn, **table}
 
 
 def chosen_controllers(

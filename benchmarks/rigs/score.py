@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from controllers.rigs import Reading, RigController
+from controllers.rigs import RigController, RigMeasurement
 from pma_gym.envs import RigEnv, RigInfo
 from pma_gym.pages.document import TextTable
 from pma_gym.plant.model import Model
@@ -51,9 +51,9 @@ def run_episode(
     controller.reset(info_of(env, nominal))
     spent, moved, before, steps, ended = 0.0, 0.0, None, 0, False
     while not ended:
-        begun = time.perf_counter()
-        commands = controller.act(Reading(env.measurement, observation, env.time))
-        spent += time.perf_counter() - begun
+        start = time.perf_counter()
+        commands = controller.act(RigMeasurement(env.measurement, observation, env.time))
+        spent += time.perf_counter() - start
         action = env.action(*commands)
         moved += 0.0 if before is None else float(np.abs(action - before).max())
         observation, _, terminated, truncated, info = env.step(action)

@@ -27,7 +27,7 @@ def tuned(
     name: str,
     options: Mapping[str, Any],
     tasks: Sequence[str],
-    told: Callable[[int, int], None] = lambda done, total: None,
+    on_progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> dict[str, float]:
     """Best settings of a controller: least mean error on the tasks, with little moving.
 
@@ -37,7 +37,7 @@ def tuned(
         name: of the controller.
         options: of the environment, whose randomisation makes the settings robust.
         tasks: names of tasks.
-        told: called with the trials made and their number.
+        on_progress: called with the trials made and their number.
     """
     kind = RIG_CONTROLLERS[name]
     if not kind.settings:
@@ -48,7 +48,7 @@ def tuned(
     def cost(logarithms: np.ndarray) -> float:
         nonlocal made
         made += 1
-        told(min(made, EVALUATIONS), EVALUATIONS)
+        on_progress(min(made, EVALUATIONS), EVALUATIONS)
         settings = dict(zip(names, np.exp(logarithms).tolist(), strict=True))
         total = 0.0
         for at, env in enumerate(environments):
@@ -61,7 +61,7 @@ def tuned(
 
     first = np.log([kind.settings[each] for each in names])
     start = min((first + np.log(factor) for factor in STARTS), key=cost)
-    found = minimize(
+    minimum = minimize(
         cost,
         start,
         method="Nelder-Mead",
@@ -72,4 +72,4 @@ def tuned(
             "fatol": 1e-3,
         },
     )
-    return {each: float(f"{v:.4g}") for each, v in zip(names, np.exp(found.x), strict=True)}
+    return {each: float(f"{v:.4g}") for each, v in zip(names, np.exp(minimum.x), strict=True)}

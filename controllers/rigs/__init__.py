@@ -3,7 +3,7 @@
 from controllers.rigs.feedforward import Feedforward
 from controllers.rigs.lqg import RigLQG
 from controllers.rigs.pid import FeedforwardPID, RigPID
-from controllers.rigs.rig_controller import Reading, RigController
+from controllers.rigs.rig_controller import RigController, RigMeasurement
 
 RIG_CONTROLLERS: dict[str, type[RigController]] = {
     each.name: each for each in (Feedforward, RigPID, FeedforwardPID, RigLQG)
@@ -14,7 +14,7 @@ __all__ = [
     "RIG_CONTROLLERS",
     "Feedforward",
     "FeedforwardPID",
-    "Reading",
+    "RigMeasurement",
     "RigController",
     "RigLQG",
     "RigPID",

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controllers.rigs.nominal_rig import NominalRig
-from controllers.rigs.rig_controller import Lever, Reading, RigController
+from controllers.rigs.rig_controller import Lever, RigController, RigMeasurement
 from pma_gym.envs import RigInfo
 
 HORIZONS = (1, 2, 4, 8, 16)
@@ -18,7 +18,7 @@ NUDGE = 0.02
 """Change of the lever from which its effect is taken."""
 
 
-class Plan(NamedTuple):
+class NominalMotion(NamedTuple):
     """How the nominal rig follows.
 
     Attributes:
@@ -34,14 +34,14 @@ class Plan(NamedTuple):
     error: float
 
 
-def plan(info: RigInfo) -> Plan:
+def plan(info: RigInfo) -> NominalMotion:
     """The best plan over the horizons."""
     rig = NominalRig(info)
     lever = Lever(info, rig)
     return min((_planned(info, rig, lever, ahead) for ahead in HORIZONS), key=lambda p: p.error)
 
 
-def _planned(info: RigInfo, rig: NominalRig, lever: Lever, ahead: int) -> Plan:
+def _planned(info: RigInfo, rig: NominalRig, lever: Lever, ahead: int) -> NominalMotion:
     """Meet the reference some periods ahead, again and again, by commands that are held till there.
 
     Source:
@@ -64,11 +64,11 @@ def _planned(info: RigInfo, rig: NominalRig, lever: Lever, ahead: int) -> Plan:
     signals = {name: np.array([each[name] for each in seen]) for name in seen[0]}
     missed = signals[rig.followed] - references[: steps + 1]
     error = float(np.sqrt(np.mean(missed**2)))
-    return Plan(lever, shares, signals, error if np.isfinite(error) else np.inf)
+    return NominalMotion(lever, shares, signals, error if np.isfinite(error) else np.inf)
 
 
 @lru_cache(maxsize=64)
-def _kept(key: "_Key") -> Plan:
+def _kept(key: "_Key") -> NominalMotion:
     return plan(key.info)
 
 
@@ -85,7 +85,7 @@ class _Key(NamedTuple):
         return isinstance(other, _Key) and self.text == other.text
 
 
-def plan_of(info: RigInfo) -> Plan:
+def plan_of(info: RigInfo) -> NominalMotion:
     """The plan of a rig and a task, made once."""
     times = np.arange(info.task.steps(1.0 / info.period)) * info.period
     text = (
@@ -102,13 +102,13 @@ class Feedforward(RigController):
     name = "feedforward"
 
     def reset(self, info: RigInfo) -> None:
-        """Plan the trial."""
+        """NominalMotion the trial."""
         self.plan, self._period = plan_of(info), info.period
         self._early = round(info.action_delay / info.period)
 
-    def act(self, reading: Reading) -> Sequence[float]:
+    def act(self, measurement: RigMeasurement) -> Sequence[float]:
         """Commands (SI) of the plan."""
-        return self.plan.lever.commands(self.share(reading.time)).tolist()
+        return self.plan.lever.commands(self.share(measurement.time)).tolist()
 
     def share(self, time: float) -> float:
         """Lever at a time (s)."""

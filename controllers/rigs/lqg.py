@@ -8,7 +8,7 @@ from scipy.linalg import expm, solve_discrete_are
 
 from controllers.rigs.feedforward import Feedforward
 from controllers.rigs.nominal_rig import NominalRig
-from controllers.rigs.rig_controller import Lever, Reading
+from controllers.rigs.rig_controller import Lever, RigMeasurement
 from pma_gym.data.signals import is_pressure
 from pma_gym.envs import RigInfo
 from pma_gym.plant import sensors
@@ -81,7 +81,7 @@ class RigLQG(Feedforward):
     settings = {"effort": 0.1, "disturbance": 1.0, "process": 0.01}
 
     def reset(self, info: RigInfo) -> None:
-        """Plan the trial, and design gain and filter."""
+        """NominalMotion the trial, and design gain and filter."""
         super().reset(info)
         a, b, c = linear_rig(info, NominalRig(info), self.plan.lever)
         self._measures, n = info.signals, len(a)
@@ -96,7 +96,7 @@ class RigLQG(Feedforward):
             enters[-1] = 1.0
         else:
             enters[:n] = b
-        effort, disturbance, process = (self.given[name] for name in self.settings)
+        effort, disturbance, process = (self.chosen[name] for name in self.settings)
         followed = c[info.signals.index(info.task.schedule.quantity)] / info.task.schedule.span
         weight = np.outer(followed, followed) + LEAST_WEIGHT * np.diag(followed @ followed + 0 * b)
         costs = solve_discrete_are(a, b[:, None], weight, [[effort**2]])
@@ -118,14 +118,14 @@ class RigLQG(Feedforward):
         least = 1e-4 * info.task.schedule.span
         return np.array([max(known[n], least) if n in has_sensor else least for n in info.signals])
 
-    def act(self, reading: Reading) -> Sequence[float]:
+    def act(self, measurement: RigMeasurement) -> Sequence[float]:
         """Commands (SI)."""
-        at = max(round(reading.time / self._period) - self._late, 0)
-        off = [reading.values[name] - self.plan.signals[name][at] for name in self._measures]
+        at = max(round(measurement.time / self._period) - self._late, 0)
+        off = [measurement.values[name] - self.plan.signals[name][at] for name in self._measures]
         self._estimate += self._filter @ (off - self._seen @ self._estimate)
         # Where the rig will be when this lever arrives.
         arrived, n = self._ahead @ self._estimate, len(self._gain)
-        planned = self.share(reading.time)
+        planned = self.share(measurement.time)
         share = float(np.clip(planned - self._gain @ arrived[:n] - arrived[n], -1.0, 1.0))
         self._estimate = self._whole @ self._estimate + self._enters * (share - planned)
         return self.plan.lever.commands(share).tolist()

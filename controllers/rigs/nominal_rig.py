@@ -33,8 +33,10 @@ class NominalRig:
 
     def inputs(self, commands: Sequence[float] | Array) -> tuple[float, float]:
         """Inputs of the equations for commands (SI)."""
-        given = {c.place: c.at(float(v)) for c, v in zip(self.info.commands, commands, strict=True)}
-        motor, regulator = (given.get(name, 0.0) for name in COMMANDS)
+        by_place = {
+            c.place: c.at(float(v)) for c, v in zip(self.info.commands, commands, strict=True)
+        }
+        motor, regulator = (by_place.get(name, 0.0) for name in COMMANDS)
         return motor, regulator
 
     def held(

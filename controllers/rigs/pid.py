@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from controllers.rigs.feedforward import Feedforward
 from controllers.rigs.nominal_rig import NominalRig
-from controllers.rigs.rig_controller import Lever, Reading, RigController
+from controllers.rigs.rig_controller import Lever, RigController, RigMeasurement
 from pma_gym.envs import RigInfo
 
 FILTER_PERIODS = 2.0
@@ -40,18 +40,18 @@ class RigPID(RigController):
         """Lever without feedback; at rest here."""
         return 0.0
 
-    def act(self, reading: Reading) -> Sequence[float]:
+    def act(self, measurement: RigMeasurement) -> Sequence[float]:
         """Commands (SI)."""
-        schedule, period, gains = self._schedule, self._period, self.given
-        wanted = schedule.at(reading.time - self._late)
-        error = (wanted - reading.values[schedule.quantity]) / schedule.span
+        schedule, period, gains = self._schedule, self._period, self.chosen
+        target = schedule.at(measurement.time - self._late)
+        error = (target - measurement.values[schedule.quantity]) / schedule.span
         change = 0.0 if self._before is None else error - self._before
         filter_s = FILTER_PERIODS * period
         self._derivative += (gains["derivative"] * change - period * self._derivative) / (
             filter_s + period
         )
         action = gains["proportional"] * error + self._integral + self._derivative
-        whole = self.feedforward(reading.time) + action
+        whole = self.feedforward(measurement.time) + action
         share = min(max(whole, -1.0), 1.0)
         if share == whole or (whole > share) != (error > 0.0):
             self._integral += gains["integral"] * period * error

@@ -13,7 +13,7 @@ from pma_gym.envs import RigInfo
 Array = NDArray[np.float64]
 
 
-class Reading(NamedTuple):
+class RigMeasurement(NamedTuple):
     """What a controller receives in a control step.
 
     Attributes:
@@ -40,7 +40,7 @@ class RigController(ABC):
 
     def __init__(self, settings: Mapping[str, float]) -> None:
         """Keep the settings."""
-        self.given = dict(settings)
+        self.chosen = dict(settings)
 
     @classmethod
     def missing(cls, info: RigInfo) -> str:
@@ -52,7 +52,7 @@ class RigController(ABC):
         """Prepare for a trial on a rig, whose task has the reference."""
 
     @abstractmethod
-    def act(self, reading: Reading) -> Sequence[float]:
+    def act(self, measurement: RigMeasurement) -> Sequence[float]:
         """Commands (SI) to hold for the next control period, in the order of the rig's."""
         ...
 
