@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import torch
 from stable_baselines3 import PPO
+from stable_baselines3.common.policies import ActorCriticPolicy
 from stable_baselines3.common.save_util import load_from_zip_file
 from stable_baselines3.common.utils import LinearSchedule
 
@@ -29,13 +30,16 @@ ENVIRONMENTS, PARTS, STEPS = 64, 10, 1_000_000
 LEARNING_RATE = 1e-3
 """At the beginning of a training."""
 
+NETWORK: dict[str, Any] = {"net_arch": [64, 64], "log_std_init": -1.0}
+"""Of a policy."""
+
 SETTINGS: dict[str, Any] = {
     "n_steps": 64,
     "batch_size": 1024,
     "n_epochs": 8,
     "gamma": 0.97,
     "learning_rate": LEARNING_RATE,
-    "policy_kwargs": {"net_arch": [64, 64], "log_std_init": -1.0},
+    "policy_kwargs": NETWORK,
     "device": "cpu",
 }
 """Of PPO (assumption: found to train on a pendulum within minutes)."""
@@ -55,11 +59,6 @@ class AnyReference:
         """Name of a task."""
         kind = list(KINDS)[generator.integers(len(KINDS))]
         return f"{self.signal}_{kind}_{generator.integers(1, SEEDS)}"
-
-
-def _learner(envs: Any, seed: int) -> PPO:  # noqa: ANN401 - a VecEnv, or one environment
-    torch.set_num_threads(1)
-    return PPO("MlpPolicy", envs, seed=seed, **SETTINGS)
 
 
 def train(
@@ -88,7 +87,8 @@ def train(
         )
     ) as envs:  # fmt: skip
         envs.seed(seed)
-        model = _learner(envs, seed)
+        torch.set_num_threads(1)
+        model = PPO("MlpPolicy", envs, seed=seed, **SETTINGS)
         if progress.exists() and file.exists():
             model.num_timesteps = int(json.loads(progress.read_text())["steps"])
             model.set_parameters(load_from_zip_file(file, load_data=False)[1])
@@ -117,7 +117,8 @@ class RigPolicy(RigController):
     def __init__(self, file: Path, options: Mapping[str, Any]) -> None:
         """Read the weights."""
         env = RigEnv(**{**options, **SEES})
-        self._policy = _learner(env, 0).policy
+        spaces = env.observation_space, env.action_space
+        self._policy = ActorCriticPolicy(*spaces, lambda _: LEARNING_RATE, **NETWORK)
         _, weights, _ = load_from_zip_file(file, load_data=False)
         self._policy.load_state_dict(weights["policy"])  # type: ignore[arg-type]
         self._policy.set_training_mode(False)

@@ -56,7 +56,8 @@ def _planned(info: RigInfo, rig: NominalRig, lever: Lever, ahead: int) -> Nomina
         pair = (share, share + (NUDGE if share < 0.0 else -NUDGE))
         ends = [rig.held(condition, lever.commands(s), ahead * period)[0] for s in pair]
         slope = (ends[1] - ends[0]) / (pair[1] - pair[0])
-        if slope != 0.0 and np.isfinite(slope):
+        # Until the first command arrives the rig is at rest.
+        if k * period >= info.action_delay - 1e-9 and slope != 0.0 and np.isfinite(slope):
             share = float(np.clip(share + (references[k + ahead] - ends[0]) / slope, -1.0, 1.0))
         shares[k] = share
         _, condition = rig.held(condition, lever.commands(share), period)
@@ -91,7 +92,12 @@ def plan_of(info: RigInfo) -> NominalMotion:
     text = (
         *(info.model.plant, tuple(info.model.parameters), info.model.vector().tobytes()),
         *(info.task.schedule.quantity, info.task.schedule.reference(times).tobytes()),
-        *(info.period, tuple(info.rest), tuple(command.limits for command in info.commands)),
+        *(
+            info.period,
+            info.action_delay,
+            tuple(info.rest),
+            tuple(command.limits for command in info.commands),
+        ),
     )
     return _kept(_Key(text, info))
 
