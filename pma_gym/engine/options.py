@@ -39,6 +39,7 @@ from pma_gym.tasks import (
     Operator,
     Randomisation,
     Task,
+    TrackingTask,
     named_task,
 )
 from pma_gym.tasks.unseen import SEEDS, unseen
@@ -280,6 +281,11 @@ def parse_task(given: str | Task, options: Options) -> Task:
             the task; or a start pressure outside the model's validity.
     """
     task = _known_task("task", given)
+    if isinstance(task, TrackingTask):
+        raise ValueError(
+            f"task {task.name} is a reference for a signal of any rig: make it with "
+            'gym.make("pma_gym/Rig-v0", model=..., task=...), or take pma_gym.tasks.following'
+        )
     if options.reference is not None:
         several = options.reference if isinstance(options.reference, list) else []
         for one in (options.reference, *several):

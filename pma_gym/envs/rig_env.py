@@ -11,6 +11,7 @@ from gymnasium import spaces
 from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
+from pma_gym.engine.option_checks import check_keywords
 from pma_gym.engine.rig.engine import RigCommands, RigEngine
 from pma_gym.engine.rig.options import RigOptions, parse_rig_options, parse_rig_task
 from pma_gym.envs.episode import Episode
@@ -21,6 +22,9 @@ from pma_gym.envs.vector import PMAVectorEnv
 from pma_gym.plant.commands import Command
 from pma_gym.plant.model import Model
 from pma_gym.tasks import REWARDS, Task
+
+OWN = ("task", "goal", "render_mode")
+"""Keyword arguments of an environment in addition to the options."""
 
 RIG = Kind(parse_rig_options, parse_rig_task, RigEngine, lambda options, _: RigCommands(options))
 
@@ -163,6 +167,7 @@ class RigEnv(RigEpisode, PMAEnv):  # type: ignore[misc]
     ) -> None:
         """Check the options and compile the rig."""
         self.goal = goal
+        check_keywords("RigEnv.__init__()", options, RigOptions.names(), OWN)
         super().__init__(task, render_mode, **options)  # type: ignore[arg-type]
         if goal:
             box = spaces.Box(-np.inf, np.inf, (1,), np.float64)
@@ -255,5 +260,6 @@ class RigVectorEnv(PMAVectorEnv):
         **options: Any,
     ) -> None:
         """Check the options and compile."""
+        check_keywords("RigVectorEnv.__init__()", options, RigOptions.names(), OWN)
         given: Any = (num_envs, task, autoreset_mode, threads, precision, None, render_mode)
         super().__init__(*given, **options)

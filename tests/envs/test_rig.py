@@ -13,7 +13,7 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.env_checker import check_env as check_sb3
 
 from pma_gym import Plant, Trial
-from pma_gym.envs import EnvState, RigEnv, RigVectorEnv
+from pma_gym.envs import EnvState, PMAEnv, RigEnv, RigVectorEnv
 from pma_gym.plant.model import load_model, parse_model, shipped_models
 from pma_gym.sb3 import SB3VecEnv
 from pma_gym.tasks import Ranges, Uncertainty, phase_rmse, tracking
@@ -248,12 +248,18 @@ def test_an_episode_ends_beyond_a_bound():
         ({"rest": {"load_command": 1.0}}, "the rig commands winding_voltage"),
         ({"pressure_kpa": 300}, "unexpected keyword argument 'pressure_kpa'"),
         ({"load": [1.0]}, "load must be a number or two"),
+        ({"compiled": False}, "unexpected keyword argument 'compiled'"),
         ({"reference": ["speed_steps"]}, "speed_steps differs"),
     ],
 )  # fmt: skip
 def test_what_cannot_be_is_refused_with_the_fix(given, words):
     with pytest.raises((ValueError, TypeError), match=re.escape(words)):
         RigEnv(**OPTIONS["joint"] | given)
+
+
+def test_a_station_refuses_the_task_of_a_rig():
+    with pytest.raises(ValueError, match="make it with gym.make"):
+        PMAEnv(tracking("contraction", np.sin))
 
 
 def test_parameters_are_drawn_from_ranges_or_a_covariance():
