@@ -52,7 +52,7 @@ def amended(folder: Path) -> tuple[Model, Uncertainty]:
     known = {
         path: each
         for path, each in ends.items()
-        if path in set(model.paths()) and each["low"] is not None and each["high"] is not None
+        if path in set(model.paths()) and isinstance(each["low"], int | float)
     }
     paths = list(known)
     errors = np.array([(e["high"] - e["low"]) / (2.0 * QUANTILE) for e in known.values()])
