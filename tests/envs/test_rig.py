@@ -206,6 +206,28 @@ def test_the_arguments_survive_json(options):
         assert json.loads(spec.to_json())["kwargs"]["duration_s"] == 1.0
 
 
+def _chirp(generator):
+    """A reference of a user's own, which only this episode has."""
+    rate = float(generator.uniform(0.5, 2.0))
+    return tracking("angle", lambda time: 0.2 + 0.3 * np.sin(rate * time * time), span=1.2)
+
+
+@pytest.mark.parametrize("reference", ["random", ["angle_sine", "angle_ramps_4"], _chirp])
+def test_every_reset_draws_a_reference_by_the_seed(reference):
+    options = OPTIONS["joint"] | {"noise": False, "preview": 1, "control_rate_hz": 50.0}
+    env, courses = RigEnv("angle_steps", reference=reference, **options), {}
+    for seed in (*range(6), 0):
+        env.reset(seed=seed)
+        observation, *_, info = env.step(np.zeros(1))
+        course = [env.reference(0.02 * k) for k in range(0, 400, 20)]
+        assert courses.setdefault(seed, course) == course
+        assert info["reference_rad"] == env.reference(0.02)
+        assert info["error_rad"] == pytest.approx(info["angle_rad"] - env.reference(0.02))
+        # Angle, speed, the reference and its error; then one ahead.
+        assert observation[4] == pytest.approx(env.reference(0.04) / 1.2, abs=1e-6)
+    assert len(set(map(tuple, courses.values()))) > 1
+
+
 def test_a_policy_trains_on_a_batch_of_any_rig():
     envs = SB3VecEnv(8, "pma_gym/Rig-v0", **everything(OPTIONS["joint"]))
     model = PPO("MlpPolicy", envs, n_steps=32, batch_size=64, n_epochs=1, device="cpu", seed=0)
