@@ -1,5 +1,6 @@
 """From logs to a controller: diagnose, tune and train on the amended and the given model, score."""
 
+import hashlib
 import json
 from collections.abc import Mapping, Sequence
 from itertools import combinations
@@ -164,9 +165,11 @@ def settings_of(
     tasks: Sequence[str],
     progress: Progress,
 ) -> dict[str, float]:
-    """Settings of a controller from the folder, or by a search."""
+    """Settings of a controller from the folder, or by a search for this environment."""
     file = out / f"{key}.json"
-    if not file.exists():
+    digest = hashlib.sha256(repr(sorted(options.items())).encode()).hexdigest()[:16]
+    kept = json.loads(file.read_text(encoding="utf-8")) if file.exists() else {}
+    if kept.get("environment") != digest:
         bar = progress.add_task(key, total=None)
         settings = tuned(
             controller,
@@ -174,8 +177,9 @@ def settings_of(
             tasks,
             lambda n, total: progress.update(bar, completed=n, total=total),
         )
-        write_text(file, json.dumps(settings) + "\n")
-    return json.loads(file.read_text())
+        kept = {"environment": digest, "settings": settings}
+        write_text(file, json.dumps(kept) + "\n")
+    return kept["settings"]
 
 
 def write_report(out: Path, title: str, rows: Sequence[Score], said: str = "") -> None:

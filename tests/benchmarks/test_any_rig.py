@@ -172,6 +172,22 @@ def test_a_controller_says_which_rigs_it_is_for(monkeypatch, tmp_path):
         run.chosen_controllers(["pda"], options, ["angle_steps"], tmp_path, Silent())
 
 
+def test_settings_are_kept_for_the_environment_that_they_were_found_on(monkeypatch, tmp_path):
+    monkeypatch.setattr(tune, "EVALUATIONS", 4)
+    options = RIGS["joint"][0] | {"duration_s": 1.0, "control_rate_hz": 50.0}
+    searches = []
+
+    class Watched(Silent):
+        def add_task(self, *words, **sizes):
+            searches.append(words)
+            return 0
+
+    for span in (1.0, 1.0, 0.5):
+        table = options | {"span": span}
+        run.chosen_controllers(["pid"], table, ["angle_steps"], tmp_path, Watched())
+    assert len(searches) == 2
+
+
 def test_controllers_are_compared_under_the_same_noise():
     options = RIGS["joint"][0] | {"duration_s": 1.0}
     made = {"a": (Feedforward({}), {}), "b": (RIG_CONTROLLERS["feedforward"]({}), {})}
