@@ -19,11 +19,12 @@ from numpy.typing import NDArray
 from pma_gym.engine.option_checks import check_known, parse_pressure
 from pma_gym.envs.member import TOGETHER, BatchMember, refusal
 from pma_gym.envs.pma_env import PMAEnv
+from pma_gym.envs.rig_env import RigEnv, RigVectorEnv
 from pma_gym.envs.summary import last_info
 from pma_gym.envs.vector import PMAVectorEnv
 from pma_gym.tasks import Task
 
-OURS = (PMAEnv, PMAVectorEnv)
+OURS = (PMAEnv, PMAVectorEnv, RigEnv, RigVectorEnv)
 
 
 def is_id(task: object) -> TypeGuard[str]:
@@ -61,9 +62,13 @@ def registered(task: str, options: Mapping[str, Any]) -> tuple[EnvSpec, dict[str
 
 
 def _is_ours(spec: EnvSpec) -> bool:
+    return not spec.additional_wrappers and _entry(spec) in OURS
+
+
+def _entry(spec: EnvSpec) -> Any:  # noqa: ANN401 - whatever was registered
     points = [point for point in (spec.vector_entry_point, spec.entry_point) if point is not None]
-    made = [load_env_creator(point) if isinstance(point, str) else point for point in points[:1]]
-    return not spec.additional_wrappers and any(one in OURS for one in made)
+    point = points[0] if points else None
+    return load_env_creator(point) if isinstance(point, str) else point
 
 
 try:
@@ -197,10 +202,13 @@ class SB3VecEnv(EngineVecEnv):
     def __init__(self, num_envs: int, task: str | Task = "displacement", **options: Any) -> None:
         """Make the environments."""
         check_known("option", [name for name in options if name == "autoreset_mode"], ())
+        batch = self._batch()
         if is_id(task):
             self.spec, options = registered(task, options)
-            task = options.pop("task", "displacement")
-        self.envs = _Batch(num_envs, task, autoreset_mode=AutoresetMode.SAME_STEP, **options)
+            if _entry(self.spec) in (RigEnv, RigVectorEnv):
+                batch = _RigBatch
+            task = options.pop("task", None if batch is _RigBatch else "displacement")
+        self.envs = batch(num_envs, task, autoreset_mode=AutoresetMode.SAME_STEP, **options)
         self.envs.spec = self.spec
         super().__init__(
             num_envs, self.envs.single_observation_space, self.envs.single_action_space
@@ -212,6 +220,9 @@ class SB3VecEnv(EngineVecEnv):
         self._returns = np.zeros(num_envs)
         self._lengths = np.zeros(num_envs, np.int64)
         self._made = time.time()
+
+    def _batch(self) -> "type[_InfosByNumber]":
+        return _Batch
 
     def reset(self) -> VecEnvObs:
         """Begin an episode in every environment, with the values of `seed` and `set_options`."""
@@ -271,7 +282,14 @@ class SB3VecEnv(EngineVecEnv):
         return observations, rewards.astype(np.float32), over, infos
 
 
-class _Batch(PMAVectorEnv):
+class SB3RigVecEnv(SB3VecEnv):
+    """`RigVectorEnv` as a VecEnv: tasks and options are those of `RigEnv`."""
+
+    def _batch(self) -> "type[_InfosByNumber]":
+        return _RigBatch
+
+
+class _InfosByNumber(PMAVectorEnv):
     """Tells of episodes that end by the number of their environment, each as SB3 has an info."""
 
     def _final(self, over: NDArray[np.bool_], indices: NDArray[np.int64]) -> dict[Any, Any]:
@@ -280,3 +298,11 @@ class _Batch(PMAVectorEnv):
             i: last_info(self.engine, i) | {"terminal_observation": observed[i].copy()}
             for i in indices.tolist()
         }
+
+
+class _Batch(_InfosByNumber):
+    """A batch of a station."""
+
+
+class _RigBatch(_InfosByNumber, RigVectorEnv):
+    """A batch of any rig."""

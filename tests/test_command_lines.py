@@ -79,6 +79,8 @@ FAST = {
         *("--pressure", "300", "--out", "v.csv"),
     ],
     "tune": ["--out", "gains.toml"],
+    "run": [],
+    "from-logs": ["lab"],
 }
 """Arguments of every command with --model."""
 
@@ -90,6 +92,7 @@ SLOW = {
     "benchmarks.tuning.tune.run_tune": lambda out, seed, model, *rest: _stop(
         pma_gym.load_model(model)
     ),
+    "benchmarks.rigs.run.run_rig": lambda model, *rest: _stop(pma_gym.load_model(model)),
 }
 """What takes long of these commands, replaced by a check of the model that it receives."""
 

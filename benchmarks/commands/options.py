@@ -94,5 +94,9 @@ ExecutorOption = Annotated[
     ExecutorName,
     typer.Option("--executor", help="Here, or at RAY_ADDRESS."),
 ]
+EnvironmentOption = Annotated[
+    str,
+    typer.Option(help="With --model: options as TOML, or its file."),
+]
 LOCAL = ExecutorName.LOCAL
 Recompute = Annotated[bool, typer.Option("--recompute", help="Compute anew what other code made.")]

@@ -7,6 +7,7 @@ import typer
 
 from benchmarks.commands.options import (
     LOCAL,
+    EnvironmentOption,
     ExecutorOption,
     Jobs,
     app,
@@ -56,7 +57,9 @@ def targets(
     epilog="Example: python -m benchmarks run --suite robust --controllers pid,mine.py:Mine"
 )
 def run(
-    suite: Annotated[str, typer.Option(help="Name, see `suites`, or path of a TOML file.")],
+    suite: Annotated[
+        str, typer.Option(help="Name, see `suites`, or TOML file; or give --model.")
+    ] = "",
     controllers: Annotated[
         str, typer.Option(help="Names or path/to/file.py:ClassName, by commas; or all.")
     ] = "all",
@@ -68,12 +71,26 @@ def run(
     stations: Annotated[
         int | None, typer.Option(min=1, help="Only the first ones, for a quick look.")
     ] = None,
-    task: Annotated[str, typer.Option(help="Only these tasks, by commas; all if empty.")] = "",
+    task: Annotated[
+        str, typer.Option("--task", "--tasks", help="Only these tasks, by commas; all if empty.")
+    ] = "",
     traces: Annotated[
         Literal["csv", "parquet"] | None, typer.Option(help="Also write every case's time series.")
     ] = None,
+    model: Annotated[str, typer.Option(help="In place of a suite: any rig's model.")] = "",
+    environment: EnvironmentOption = "",
+    seeds: Annotated[int, typer.Option(min=1, help="Episodes of a task of --model.")] = 10,
 ) -> None:
-    """Compare controllers on a frozen suite; an interrupted run goes on where it stopped."""
+    """Compare controllers on a suite or a rig's model; a stopped run goes on."""
+    if model:
+        from benchmarks.rigs.run import run_rig
+
+        chosen_ones = [] if controllers == "all" else listed(controllers)
+        folder = out or RESULTS / "rigs" / Path(model).stem
+        run_rig(model, listed(task), chosen_ones, environment, seeds, folder)
+        return
+    if not suite:
+        raise ValueError("run needs --suite NAME, or --model FILE for any rig")
     from benchmarks.comparison.job import chosen, run_comparison
     from benchmarks.reproduction.reproduce import run_job
     from benchmarks.suites.frozen import frozen_suite

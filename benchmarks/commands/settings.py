@@ -8,6 +8,7 @@ import typer
 
 from benchmarks.commands.options import (
     INTERRUPTED,
+    EnvironmentOption,
     Jobs,
     OptionalOut,
     app,
@@ -86,8 +87,26 @@ def tune(
     only: Annotated[
         str, typer.Option(help="Tables by loop and kind of task, such as '50hz*/rotation'.")
     ] = "*",
+    tasks: Annotated[
+        str, typer.Option(help="Tasks of any rig, by commas: tune its controllers on these.")
+    ] = "",
+    environment: EnvironmentOption = "",
 ) -> None:
     """Tune the gains of the PIDs on a model; without --out, the shipped table of gains."""
+    if tasks:
+        from rich.progress import Progress
+
+        from benchmarks.rigs.run import chosen_controllers, rig_options
+
+        folder = RESULTS / "rigs" / Path(model).stem
+        with Progress() as progress:
+            made = chosen_controllers(
+                [], rig_options(model, environment), listed(tasks), folder, progress
+            )
+        for name, (controller, _) in made.items():
+            print(f"{name}: {controller.chosen or 'no settings'}")
+        print(f"Kept in {folder}, where `run --model {model}` takes them from")
+        return
     from benchmarks.tuning.tune import GAINS_FILE, TuneError, run_tune
 
     out = out or GAINS_FILE

@@ -11,6 +11,36 @@ from benchmarks.commands.options import app
 from benchmarks.files import RESULTS
 
 
+@app.command("from-logs", epilog="Example: python -m benchmarks from-logs my_logs")
+def from_logs(
+    logs: Annotated[Path, typer.Argument(help="Folder of logs, as `pma-gym diagnose` takes it.")],
+    model: Annotated[
+        str | None, typer.Option(help="Shipped name or TOML file; else the data set's own.")
+    ] = None,
+    diagnosis: Annotated[
+        Path | None, typer.Option(help="Folder of a diagnosis; else the logs are diagnosed.")
+    ] = None,
+    out: Annotated[Path | None, typer.Option(help="Folder; else results/from-logs/NAME.")] = None,
+    steps: Annotated[
+        int, typer.Option(min=1, help="Control steps that each policy is trained for.")
+    ] = 1_000_000,
+) -> None:
+    """Diagnose logs, then tune a PID and train a policy on the model; score them on both models."""
+    from rich.progress import Progress
+
+    from benchmarks.rigs.from_logs import run_from_logs
+    from pma_gym.cli.discovery import diagnose
+
+    folder = out or RESULTS / "from-logs" / logs.resolve().name
+    answer = diagnosis or folder / "diagnosis"
+    if not (answer / "diagnosis.json").exists():
+        folder.mkdir(parents=True, exist_ok=True)
+        diagnose(logs, model, answer, resume=answer.is_dir())
+    with Progress() as progress:
+        run_from_logs(logs, model, answer, folder, progress, steps)
+    print(f"Report: {folder / 'report.html'}")
+
+
 @app.command(epilog="Example: python -m benchmarks train --algo ppo --task displacement --seed 1")
 def train(
     algo: Annotated[str, typer.Option(help="ppo, sac, td3 or tqc.")],

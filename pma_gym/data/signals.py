@@ -16,6 +16,18 @@ Measured = Literal[
     "voltage", "displacement", "speed", "angle", "angular speed", "force", "torque", "pressure"
 ]
 
+SI_UNITS: dict[str, str] = {
+    "voltage": "V",
+    "displacement": "m",
+    "speed": "m/s",
+    "angle": "rad",
+    "angular speed": "rad/s",
+    "force": "N",
+    "torque": "N m",
+    "pressure": "Pa",
+}
+"""Unit in SI of what signals measure."""
+
 VOLTAGE_RANGE = (0.0, 10.0)
 """What the motor's drive and the regulator accept (V)."""
 
@@ -83,6 +95,15 @@ class Signal:
         'contraction_mm'
         """
         return f"{self.name}_{suffix(self.unit)}"
+
+    @property
+    def si_unit(self) -> str:
+        """Its unit in SI.
+
+        >>> SIGNALS["contraction"].si_unit, SIGNALS["torque_command"].si_unit
+        ('m', 'N m')
+        """
+        return SI_UNITS[self.measures]
 
     @property
     def resolution(self) -> float:

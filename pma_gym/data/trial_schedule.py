@@ -93,7 +93,7 @@ class TrialSchedule:
 
     Attributes:
         name: how the task is called.
-        quantity: what is to follow.
+        quantity: what is to follow: as above, or a signal that a rig measures.
         unit: the quantity's unit where people read it.
         span: range that an error is given in percent of (m or rad): what the reference covers, or
             may cover.
@@ -101,7 +101,7 @@ class TrialSchedule:
     """
 
     name: str
-    quantity: Followed
+    quantity: Followed | str
     unit: str
     span: float
     phases: tuple[Phase, ...]

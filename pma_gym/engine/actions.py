@@ -1,6 +1,7 @@
 """Conversion between actions and voltages, with checks of an agent's actions."""
 
 import math
+from typing import Any
 
 import numpy as np
 from gymnasium import spaces
@@ -28,8 +29,12 @@ class CommandLine:
         """Set the size of the action space."""
         self._actuator = actuator
         self._size = 2 if options.regulator_action else 1
-        self.space = spaces.Box(-1.0, 1.0, (self._size,), np.float32)
+        self.space = self._box(self._size)
         self.begin(0.0)
+
+    @staticmethod
+    def _box(size: int) -> "spaces.Box[Any]":
+        return spaces.Box(-1.0, 1.0, (size,), np.float32)
 
     def begin(self, regulator_voltage: float) -> None:
         """Start a trial in equilibrium at a regulator voltage (V)."""

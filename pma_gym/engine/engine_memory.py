@@ -4,21 +4,25 @@ The complete compiled control step of one or many environments.
 """
 
 import ctypes
+from collections.abc import Callable
 
 import numpy as np
+from llvmlite import ir
 from numpy.typing import NDArray
 
 from pma_gym.codegen.machine.native import Library, compiled, pairs, simd_lanes
 from pma_gym.engine.cpu.block_memory import ARGUMENTS, BEFORE
 from pma_gym.engine.cpu.step_writer import Writer
+from pma_gym.engine.graph.control_step_graph import ControlStepGraph
 from pma_gym.engine.observation import ObservationTable, step_references
 from pma_gym.engine.options import Options, draw_task
 from pma_gym.engine.state_layout import StateLayout
+from pma_gym.plant.composition import PlantEquations
 from pma_gym.plant.equilibrium.solver import hangs_by_itself
 from pma_gym.plant.model import Model
 from pma_gym.plant.plant import Plant
 from pma_gym.plant.program import Program, structure
-from pma_gym.tasks import Task
+from pma_gym.tasks import Task, limit_in_words
 
 
 class Kernel:
@@ -36,6 +40,9 @@ class Kernel:
             that pulls on no load.
     """
 
+    equations_type: Callable[..., PlantEquations] = PlantEquations
+    graph_type: type[ControlStepGraph] = ControlStepGraph
+
     def __init__(
         self,
         program: Program,
@@ -46,18 +53,22 @@ class Kernel:
     ) -> None:
         self.program, self.state_layout, self.observed = program, state_layout, table
         self.width, self.abreast, self.single = width, simd_lanes(), single
-        task, undisturbed = (
-            state_layout.task,
-            state_layout.options.randomisation == "none" and not state_layout.events,
-        )
-        pulls_none = task.actuator == "motor" and task.exercise is None
-        self.draws = undisturbed and pulls_none and hangs_by_itself(program.model)
-        self.library: Library = compiled(self._key(), lambda: Writer(self).module, "environment")
+        self.draws = self._draws()
+        self.library: Library = compiled(self._key(), self._module, "environment")
         get = self.library.function
         self.check = get("check", [ctypes.c_void_p], ctypes.c_int64)
         self.begin = get("begin", [ctypes.c_void_p, ctypes.c_void_p], ctypes.c_int64)
         self.table = get("table", [ctypes.c_void_p, ctypes.c_void_p])
         self.table_size = int(get("table_size", [], ctypes.c_int64)())
+
+    def _draws(self) -> bool:
+        task, options = self.state_layout.task, self.state_layout.options
+        undisturbed = options.randomisation == "none" and not self.state_layout.events
+        pulls_none = task.actuator == "motor" and task.exercise is None
+        return undisturbed and pulls_none and hangs_by_itself(self.program.model)
+
+    def _module(self) -> ir.Module:
+        return Writer(self).module
 
     def _key(self) -> list[str]:
         options, state_layout = self.state_layout.options, self.state_layout
@@ -80,6 +91,8 @@ class EngineMemory:
         nominal: the Plant of the nominal model.
     """
 
+    layout_type, table_type, kernel_type = StateLayout, ObservationTable, Kernel
+
     def __init__(
         self,
         task: Task,
@@ -92,11 +105,11 @@ class EngineMemory:
         """Compile, and allocate arrays."""
         self.task, self.options, self.count = task, options, count
         self.nominal_model, self.nominal = nominal_model, nominal
-        self.state_layout = StateLayout(tuple(self.nominal.states), task, options)
-        self.table = ObservationTable(task, options)
+        self.state_layout = self.layout_type(tuple(self.nominal.states), task, options)
+        self.table = self.table_type(task, options)
         self.width = 1 if count == 1 else simd_lanes(single)
         program = self.nominal.program
-        self.kernel = Kernel(program, self.state_layout, self.table, self.width, single)
+        self.kernel = self.kernel_type(program, self.state_layout, self.table, self.width, single)
         self.models = [self.nominal.model] * count
         self.tasks, self._drawn_by = [task] * count, [(0, 0, -1)] * count
         self.pressures = np.zeros(count)
@@ -200,9 +213,17 @@ class EngineMemory:
             if drawn_by != self._drawn_by[index]:
                 task = self.task
                 if drawn_by[-1] >= 0:
-                    task = draw_task(task, self.options.reference, self._generator(index, 1))
+                    task = self._drawn_task(self._generator(index, 1))
                 self._followed[index], self.tasks[index] = self._row_of(task), task
                 self._drawn_by[index] = drawn_by
+
+    def _drawn_task(self, generator: np.random.Generator) -> Task:
+        """What an episode follows, by its random numbers."""
+        return draw_task(self.task, self.options.reference, generator)
+
+    def limit_in_words(self, index: int, code: float) -> str:
+        """Name of the limit that ended an environment's episode; "" for a code of 0."""
+        return limit_in_words(self.models[index], code, self.task.exercise)
 
     def numbers(self, name: str) -> NDArray[np.float64]:
         """Copy a number of every environment, given by name, shape (n,)."""

@@ -16,8 +16,8 @@ def rig_model(task: Task, options: Options) -> Model:
     model = options.nominal
     if not model.rig.has_muscle:
         raise ValueError(
-            f"an environment needs the model of a station or a cascade; model {model.name} is of "
-            f'plant = "{model.plant}", which has no muscle; take station or serres2008'
+            f"task {task.name} needs the model of a station or a cascade; model {model.name} is of "
+            f'plant = "{model.plant}": make it with gym.make("pma_gym/Rig-v0", model=...)'
         )
     pushed = options.disturbing.hand_push_force != 0.0
     if not model.rig.balances_loads and (pushed or task.load or task.exercise):

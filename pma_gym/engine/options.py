@@ -5,7 +5,7 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import Any, Self, TypedDict
+from typing import Any, Self, TypedDict, TypeVar
 
 import numpy as np
 
@@ -39,6 +39,7 @@ from pma_gym.tasks import (
     Operator,
     Randomisation,
     Task,
+    TrackingTask,
     named_task,
 )
 from pma_gym.tasks.unseen import SEEDS, unseen
@@ -124,6 +125,11 @@ class Options:
     tolerance: float = DEFAULT_TOLERANCE
     max_episode_steps: int | None = None
 
+    @classmethod
+    def names(cls) -> list[str]:
+        """Names of the keyword arguments."""
+        return [field.name for field in fields(cls)]
+
     def __getstate__(self) -> dict[str, Any]:
         """Return the fields for pickle; functions among them need no module."""
         return {n: packed(n, v) if callable(v) else v for n, v in vars(self).items()}
@@ -207,25 +213,32 @@ class EnvironmentOptions(TypedDict, total=False):
     max_episode_steps: int | None
 
 
+Kind = TypeVar("Kind", bound=Options)
+
+
 def parse_options(
-    given: Mapping[str, Any], caller: str = "the environment", others: Sequence[str] = ()
-) -> Options:
+    given: Mapping[str, Any],
+    caller: str = "the environment",
+    others: Sequence[str] = (),
+    kind: type[Kind] = Options,  # type: ignore[assignment]
+) -> Kind:
     """Check keyword arguments and return the options.
 
     Args:
         given: the keyword arguments.
         caller: name of the called function or class, for the message.
         others: names of the caller's further keyword arguments, for the message.
+        kind: of the options.
 
     Raises:
         TypeError: an unknown keyword, with the nearest known one.
         ValueError: a value that is out of range or of the wrong kind.
     """
-    check_keywords(caller, given, [field.name for field in fields(Options)], others)
+    check_keywords(caller, given, kind.names(), others)
     if isinstance(given.get("max_episode_steps"), DefaultSteps):
         # Of the registered options, not of these: nobody asked for it.
         given = {**given, "max_episode_steps": None}
-    options = Options(**plain_options(given))
+    options = kind(**plain_options(given))
     _check_model(options.model)
     check_memory_at_start(options.memory_at_start, "episodes")
     _check_rate_and_delays(options)
@@ -268,6 +281,11 @@ def parse_task(given: str | Task, options: Options) -> Task:
             the task; or a start pressure outside the model's validity.
     """
     task = _known_task("task", given)
+    if isinstance(task, TrackingTask):
+        raise ValueError(
+            f"task {task.name} is a reference for a signal of any rig: make it with "
+            'gym.make("pma_gym/Rig-v0", model=..., task=...), or take pma_gym.tasks.following'
+        )
     if options.reference is not None:
         several = options.reference if isinstance(options.reference, list) else []
         for one in (options.reference, *several):
@@ -289,13 +307,19 @@ def _known_task(what: str, given: object, *others: str) -> Task:
     return task
 
 
-def draw_task(task: Task, reference: object, generator: np.random.Generator) -> Task:
+def draw_task(
+    task: Task,
+    reference: object,
+    generator: np.random.Generator,
+    named: Callable[[str], Task | None] | None = None,
+) -> Task:
     """Draw the task of an episode.
 
     Args:
         task: the environment's task.
         reference: the option `reference`.
         generator: random numbers of the episode.
+        named: the task of a name, where it is none of a station.
     Raises:
         ValueError: no task, or one that differs from the environment's in more than its reference.
     """
@@ -304,7 +328,7 @@ def draw_task(task: Task, reference: object, generator: np.random.Generator) -> 
         drawn = drawn[generator.integers(len(drawn))]
     if isinstance(drawn, str) and drawn == "random":
         kind = re.sub("_[0-9]+$", "", task.name)
-        drawn = unseen(f"{kind}_{generator.integers(SEEDS)}")
+        drawn = (named or unseen)(f"{kind}_{generator.integers(SEEDS)}")
         if drawn is None:
             raise ValueError(
                 'reference "random" draws another seed of a task such as displacement_multisine, '
@@ -317,6 +341,7 @@ def draw_task(task: Task, reference: object, generator: np.random.Generator) -> 
             "of a function of time), a list of these, or a function of a generator that returns "
             f"one, got {drawn!r}"
         )
+    drawn = (isinstance(drawn, str) and named and named(drawn)) or drawn
     drawn = _known_task("reference", drawn, "random")
     own, other = ((t.structure, t.load, t.exercise) for t in (task, drawn))
     if own != other:

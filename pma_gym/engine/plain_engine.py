@@ -10,7 +10,7 @@ from pma_gym.codegen.graph import CHANGING, Number, NumberGraph, Value
 from pma_gym.engine.cpu.python_step import NOT_READ
 from pma_gym.engine.engine import Engine
 from pma_gym.engine.graph.control_step_graph import ControlStepGraph
-from pma_gym.engine.graph.scoring import COURSE, course, sampling
+from pma_gym.engine.graph.scoring import COURSE, course, position_of, sampling
 from pma_gym.plant.composition import PlantEquations
 from pma_gym.plant.forms.plain import Made, PlainPlant
 from pma_gym.plant.model import Model
@@ -36,7 +36,9 @@ class PlainEngine(Engine):
         if self._station is not self.models[0]:
             self._station = self.models[0]
             system = self.nominal.program.zero_order_hold
-            watched = course(system.equations, system.attempt, self.task).values
+            eq = system.equations
+            position = position_of(eq, self.task, eq.outputs)
+            watched = course(eq, system.attempt, position).values
             self._plain = PlainPlant(Plant(self._station, self.nominal.tolerance), watched)
         return self._plain
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from pma_gym.codegen.graph import Kind, Value
+from pma_gym.data.signals import Signal
 from pma_gym.engine.options import Options
 from pma_gym.plant.rigs.station import STATION
 from pma_gym.tasks import PACE, Exercise, MomentProfile, Operator, OperatorState, Task
@@ -73,6 +74,26 @@ class StateLayout:
     states: tuple[str, ...]
     task: Task
     options: Options
+
+    @property
+    def signals(self) -> tuple[Signal, ...]:
+        """The measured signals."""
+        return STATION.signals
+
+    @property
+    def parts(self) -> tuple[str, ...]:
+        """Components of a measurement, in order."""
+        return PARTS
+
+    @property
+    def push(self) -> str:
+        """Name of the force that disturbances push with."""
+        return HAND_PUSH
+
+    @property
+    def recorded(self) -> str:
+        """Command that a single environment writes down in every step."""
+        return f"{self.task.actuator}_voltage"
 
     @property
     def actions(self) -> int:

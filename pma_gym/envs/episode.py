@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from pma_gym.engine.engine import Engine
 from pma_gym.engine.observation import ObservationTable
 from pma_gym.engine.options import Options
-from pma_gym.engine.state_layout import HAND_PUSH, PARTS, START, TRUTH
+from pma_gym.engine.state_layout import HAND_PUSH, START, TRUTH
 from pma_gym.envs.station_info import Measurement, Reference, StationInfo, detached_task
 from pma_gym.envs.summary import episode_summary
 from pma_gym.plant.plant import Plant
@@ -53,8 +53,9 @@ class Episode:
     def _find_offsets(self) -> None:
         self._offsets = self._engine.state_layout.offsets
         # The record holds a reading's parts side by side.
-        first = self._offsets[f"{PARTS[0]}_{self.options.observation_delay}"]
-        self._measured = slice(first, first + len(PARTS))
+        parts = self._engine.state_layout.parts
+        first = self._offsets[f"{parts[0]}_{self.options.observation_delay}"]
+        self._measured = slice(first, first + len(parts))
         self._datum = START if START in self._offsets else "zero_contraction"
 
     def _number(self, name: str) -> float:

@@ -15,12 +15,12 @@ from pma_gym.engine.observation import ObservationTable
 from pma_gym.engine.option_checks import Pressure, check_known
 from pma_gym.engine.options import Options
 from pma_gym.envs.episode import NOT_BEGUN
-from pma_gym.envs.pma_env import RESET_OPTIONS, PMAEnv
+from pma_gym.envs.pma_env import PMAEnv
 from pma_gym.envs.rendering.display import Display
 from pma_gym.envs.rendering.scene import History, RecordingEngine
 from pma_gym.envs.summary import step_info
 from pma_gym.plant.plant import Plant
-from pma_gym.tasks import Task, limit_in_words
+from pma_gym.tasks import Task
 
 TOGETHER = "the environments of a batch share one engine"
 
@@ -38,6 +38,7 @@ class Batch(Protocol):
     # In quotes: Gymnasium 1.1's Box takes no type.
     single_observation_space: "spaces.Box[Any]"
     single_action_space: "spaces.Box[Any]"
+    _commands: CommandLine
     _started: NDArray[np.bool_]
     _ended: NDArray[np.bool_]
 
@@ -81,7 +82,7 @@ class BatchMember(PMAEnv):
             "_engine": engine,
             "_index": index,
             "_row": engine.records[block, :, lane],
-            "_commands": CommandLine(batch.options, batch.task.actuator),
+            "_commands": batch._commands,
             "render_mode": batch.render_mode,
             "spec": batch.spec,
             "metadata": {k: v for k, v in batch.metadata.items() if k != "autoreset_mode"},
@@ -124,8 +125,7 @@ class BatchMember(PMAEnv):
     @property
     def ended_by(self) -> str:  # type: ignore[override]
         """Name of the limit that terminated the episode, or ""."""
-        model = self._engine.models[self._index]
-        return limit_in_words(model, self._number("ended"), self.task.exercise)
+        return self._engine.limit_in_words(self._index, self._number("ended"))
 
     @property
     def plant(self) -> Plant:  # type: ignore[override]
@@ -140,7 +140,7 @@ class BatchMember(PMAEnv):
         self, *, seed: int | None = None, options: Mapping[str, Any] | None = None
     ) -> tuple[NDArray[np.float32], dict[str, Any]]:
         """Reset this environment; the others continue. See `PMAEnv.reset`."""
-        check_known("reset option", options or {}, RESET_OPTIONS)
+        check_known("reset option", options or {}, self._kind.reset_options)
         mask = np.arange(self._batch.num_envs) == self._index
         seeds = [seed if mine else None for mine in mask.tolist()]
         observations, _ = self._batch.reset(

@@ -8,16 +8,15 @@ import numpy as np
 from gymnasium.envs.registration import EnvSpec
 from numpy.typing import NDArray
 
-from pma_gym.engine.actions import CommandLine
 from pma_gym.engine.cpu.python_step import NOT_READ
 from pma_gym.engine.cpu.step_writer import BAD_ACTION
-from pma_gym.engine.engine import Engine
 from pma_gym.engine.option_checks import Pressure, check_known, check_named, parse_pressure
-from pma_gym.engine.options import EnvironmentOptions, parse_options, parse_task
+from pma_gym.engine.options import EnvironmentOptions
 from pma_gym.engine.plain_engine import PlainEngine
 from pma_gym.engine.snapshot import put, take
 from pma_gym.envs.batch import FunctionRewards, parse_seed
 from pma_gym.envs.episode import NOT_BEGUN, Episode
+from pma_gym.envs.kind import STATION
 from pma_gym.envs.rendering.display import Display
 from pma_gym.envs.rendering.scene import USUAL_WIDTH, History, check_render_width
 from pma_gym.envs.setup import SINGLE, Copies, SeededByReset, Setup, setup
@@ -25,12 +24,10 @@ from pma_gym.envs.specs import completed_spec
 from pma_gym.envs.state import EnvState, check_state, generator_at, generator_state
 from pma_gym.envs.summary import last_info, no_scores, step_info
 from pma_gym.metrics import SAMPLE_RATE_HZ
-from pma_gym.tasks import Task, limit_in_words
+from pma_gym.tasks import Task
 
 OWN = ("task", "render_mode", "render_width", "compiled")
 """Keyword arguments of an environment in addition to the options."""
-
-RESET_OPTIONS = ("pressure_kpa",)
 
 
 class PMAEnv(Copies, SeededByReset, Episode, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
@@ -207,6 +204,7 @@ class PMAEnv(Copies, SeededByReset, Episode, gym.Env[NDArray[np.float32], NDArra
     """
 
     metadata: dict[str, Any] = {"render_modes": ["human", "rgb_array"], "render_fps": 100}
+    _kind = STATION
 
     def __init__(
         self,
@@ -221,13 +219,13 @@ class PMAEnv(Copies, SeededByReset, Episode, gym.Env[NDArray[np.float32], NDArra
             check_named("render_mode", render_mode, self.metadata["render_modes"])
         self.render_mode = render_mode
         self.render_width = check_render_width(render_width)
-        self.options = parse_options(options, "PMAEnv.__init__()", OWN)
-        parsed = parse_task(task, self.options)
+        self.options = self._kind.options(options, "PMAEnv.__init__()", OWN)
+        parsed = self._kind.task(task, self.options)
         if not isinstance(compiled, bool):
             raise ValueError(f"compiled must be true or false, got {compiled!r}")
-        self._engine = (Engine if compiled else PlainEngine)(parsed, self.options)
+        self._engine = (self._kind.engine if compiled else PlainEngine)(parsed, self.options)
         self.observation_space = self._engine.table.space
-        self._commands = CommandLine(self.options, parsed.actuator)
+        self._commands = self._kind.commands(self.options, parsed)
         self.action_space = self._commands.space
         # A film of every step plays in real time.
         self.metadata = self.metadata | {"render_fps": round(self.options.control_rate_hz)}
@@ -340,8 +338,7 @@ class PMAEnv(Copies, SeededByReset, Episode, gym.Env[NDArray[np.float32], NDArra
         """What the step that ends an episode returns."""
         self._wait(f"the episode ended at {self.time:g} s")
         info = last_info(self._engine, 0)
-        model = self._engine.models[0]
-        self.ended_by = limit_in_words(model, info["limit_code"], self.task.exercise)
+        self.ended_by = self._engine.limit_in_words(0, info["limit_code"])
         self._display.show(self)
         return self._observed.copy(), self._number("reward"), terminated, not terminated, info
 
@@ -358,7 +355,7 @@ class PMAEnv(Copies, SeededByReset, Episode, gym.Env[NDArray[np.float32], NDArra
         return gym.error.ResetNeeded(f"{self._idle}: call reset() before {wanted}")
 
     def _wanted_pressure(self, options: Mapping[str, Any]) -> Pressure:
-        check_known("reset option", options, RESET_OPTIONS)
+        check_known("reset option", options, self._kind.reset_options)
         if "pressure_kpa" in options:
             return parse_pressure(options["pressure_kpa"], self._engine.nominal_model)
         return self.options.pressure_kpa

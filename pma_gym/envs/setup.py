@@ -31,14 +31,6 @@ SINGLE = "a PMAEnv"
 FEW = 4
 """Largest number of differences in a message."""
 
-_OPTIONS = {
-    # The nominal model stands elsewhere, number by number, wherever it was read from.
-    field.name: field.default
-    for field in fields(Options)
-    if field.name not in ("model", "pressure_kpa")
-}
-"""Options in a setup, with their defaults."""
-
 _ADDRESS = re.compile(r" at 0x[0-9a-fA-F]+")
 
 
@@ -51,7 +43,9 @@ def setup(engine: Engine, **others: object) -> Setup:
     """
     said = {name: _text(value) for name, value in others.items()}
     said |= _task(engine)
-    said |= {name: _text(getattr(engine.options, name)) for name in _OPTIONS}
+    # The nominal model stands elsewhere, number by number, wherever it was read from.
+    names = [f.name for f in fields(engine.options) if f.name not in ("model", "pressure_kpa")]
+    said |= {name: _text(getattr(engine.options, name)) for name in names}
     several = len(set(map(repr, engine.wanted))) > 1
     said["pressures_kpa" if several else "pressure_kpa"] = _text(
         engine.wanted if several else engine.wanted[0]

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from pma_gym.engine.engine import Engine
 from pma_gym.envs.batch import spread
-from pma_gym.tasks import PACE, Task, limit_in_words
+from pma_gym.tasks import PACE, Task
 from pma_gym.units import SI_FACTORS
 
 Indices = Sequence[int] | NDArray[np.int64]
@@ -66,7 +66,7 @@ def episode_summary(engine: Engine, index: int) -> dict[str, Any]:
     phases = {phase.name: score.pop(_phase_key(phase.name, unit)) for phase in task.schedule.phases}
     code = score.pop("limit_code")
     started = {name: value for name, value in phases.items() if not math.isnan(value)}
-    limit = limit_in_words(engine.models[index], code, task.exercise)
+    limit = engine.limit_in_words(index, code)
     followed = {"task": engine.tasks[index].name, "ended_by": limit}
     return score | {f"rmse_by_phase_{unit}": started} | followed
 

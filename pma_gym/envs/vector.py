@@ -12,8 +12,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from pma_gym.engine.actions import CommandLine
-from pma_gym.engine.engine import ActionError, Engine
+from pma_gym.engine.engine import ActionError
 from pma_gym.engine.observation import ObservationTable
 from pma_gym.engine.option_checks import (
     Pressure,
@@ -23,10 +22,10 @@ from pma_gym.engine.option_checks import (
     parse_pressures,
     plain_scalar,
 )
-from pma_gym.engine.options import EnvironmentOptions, parse_options, parse_task
+from pma_gym.engine.options import EnvironmentOptions
 from pma_gym.engine.snapshot import put, take
-from pma_gym.engine.state_layout import PARTS
 from pma_gym.envs.batch import BatchActions, FunctionRewards, all_seeds, masked, requested_pressures
+from pma_gym.envs.kind import STATION
 from pma_gym.envs.member import BatchMember
 from pma_gym.envs.rendering.display import Display
 from pma_gym.envs.rendering.scene import USUAL_WIDTH, RecordingEngine, check_render_width
@@ -41,8 +40,6 @@ OWN = (
     *("render_mode", "render_width"),
 )
 """Keyword arguments of a batch in addition to the options."""
-
-RESET_OPTIONS = ("pressure_kpa", "pressures_kpa", "reset_mask")
 
 
 class PMAVectorEnv(
@@ -90,6 +87,7 @@ class PMAVectorEnv(
         "render_fps": 100,
         "autoreset_mode": AutoresetMode.NEXT_STEP,
     }
+    _kind, _member_type = STATION, BatchMember
 
     def __init__(
         self,
@@ -116,8 +114,8 @@ class PMAVectorEnv(
         self.render_width = check_render_width(render_width)
         self.num_envs = num_envs = int(num_envs)
         self.autoreset_mode = AutoresetMode(autoreset_mode)
-        self.options = parse_options(options, "PMAVectorEnv.__init__()", OWN)
-        self.task = parse_task(task, self.options)
+        self.options = self._kind.options(options, "PMAVectorEnv.__init__()", OWN)
+        self.task = self._kind.task(task, self.options)
         self.metadata = self.metadata | {
             "render_fps": round(self.options.control_rate_hz),
             "autoreset_mode": self.autoreset_mode,
@@ -127,10 +125,11 @@ class PMAVectorEnv(
                 raise ValueError("give either pressure_kpa for all or pressures_kpa for each")
             pressures_kpa = parse_pressures(pressures_kpa, num_envs, self.options.nominal)
         single = precision == "single"
-        kind = Engine if render_mode is None else RecordingEngine
+        kind = self._kind.engine if render_mode is None else RecordingEngine
         self.engine = kind(self.task, self.options, num_envs, int(threads), single, pressures_kpa)
         self.single_observation_space = self.engine.table.space
-        self.single_action_space = CommandLine(self.options, self.task.actuator).space
+        self._commands = self._kind.commands(self.options, self.task)
+        self.single_action_space = self._commands.space
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
         self._all = np.arange(num_envs)
@@ -171,7 +170,9 @@ class PMAVectorEnv(
             ValueError: a pressure out of range, or seeds, pressures or a mask of another length.
         """
         requested = dict(options or {})
-        check_known("reset option", requested, RESET_OPTIONS)
+        pressures = ["pressures_kpa"] if self._kind.reset_options else []
+        known = [*self._kind.reset_options, *pressures, "reset_mask"]
+        check_known("reset option", requested, known)
         indices = (
             masked(requested["reset_mask"], self.num_envs)
             if "reset_mask" in requested
@@ -392,7 +393,8 @@ class PMAVectorEnv(
         `PMAEnv.measurement`.
         """
         late = self.options.observation_delay
-        return np.stack([self.engine.numbers(f"{part}_{late}") for part in PARTS])
+        parts = self.engine.state_layout.parts
+        return np.stack([self.engine.numbers(f"{part}_{late}") for part in parts])
 
     @property
     def pressures(self) -> NDArray[np.float64]:
@@ -418,7 +420,7 @@ class PMAVectorEnv(
                 f"there is no environment {index} in a batch of {self.num_envs}: numbers go from "
                 f"{-self.num_envs} to {self.num_envs - 1}"
             )
-        return BatchMember(self, index % self.num_envs)
+        return self._member_type(self, index % self.num_envs)
 
     def render(self) -> tuple[NDArray[np.uint8], ...] | None:  # type: ignore[override]
         """Return a picture of every station and of its trial so far, RGB.

@@ -26,6 +26,8 @@ from pma_gym.tasks.randomisation import (
     RANDOMISATIONS,
     VARIATION,
     Randomisation,
+    Ranges,
+    Uncertainty,
     nominal_station,
     station_within_intervals,
     varied_station,
@@ -51,6 +53,7 @@ from pma_gym.tasks.task import (
     smooth_reward,
     unsafe,
 )
+from pma_gym.tasks.tracking import KINDS, TrackingTask, as_tracking, named_tracking, tracking
 from pma_gym.tasks.unseen import UNSEEN, following, multisine, sine, speeds, steps, unseen
 
 EVERY_TASK: dict[str, Task] = {**TASKS, **UNSEEN, **ISOTONIC, **EXERCISES}
@@ -72,6 +75,7 @@ __all__ = [
     "GAUSSIAN_END",
     "OPERATOR_BOUNDS",
     "ISOTONIC",
+    "KINDS",
     "LIMITS",
     "LOWEST_RATE_HZ",
     "PACE",
@@ -84,6 +88,7 @@ __all__ = [
     "TASKS",
     "TRIAL_TAIL_S",
     "UNSEEN",
+    "Uncertainty",
     "VARIATION",
     "Actuator",
     "Disturbances",
@@ -94,9 +99,12 @@ __all__ = [
     "MomentProfile",
     "Population",
     "Randomisation",
+    "Ranges",
     "Reward",
     "Task",
+    "TrackingTask",
     "absolute_reward",
+    "as_tracking",
     "broken",
     "broken_limit",
     "following",
@@ -109,6 +117,7 @@ __all__ = [
     "moment_exercise",
     "multisine",
     "named_task",
+    "named_tracking",
     "nominal_station",
     "numbered_exercise",
     "infeasibility_reason",
@@ -122,6 +131,7 @@ __all__ = [
     "speeds",
     "station_within_intervals",
     "steps",
+    "tracking",
     "unsafe",
     "varied_station",
 ]

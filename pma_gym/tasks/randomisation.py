@@ -1,6 +1,7 @@
 """Randomisations of the station, drawn at every reset, by name."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -128,6 +129,46 @@ def _bounded(model: Model, path: str, value: float) -> float:
 def _quantity(model: Model, path: str) -> Quantity:
     effect, _, file_key = path.partition(".")
     return model.effects[effect].quantities[model.effects[effect].names_in_files()[file_key]]
+
+
+@dataclass(frozen=True)
+class Ranges:
+    """Draws parameters evenly from ranges.
+
+    Attributes:
+        ends: lowest and highest value by `effect.parameter_unit`, in file units.
+    """
+
+    ends: Mapping[str, Sequence[float]]
+
+    def __call__(self, model: Model, generator: np.random.Generator) -> Model:
+        """The model with drawn values."""
+        ends = sorted(self.ends.items())
+        return model.replace(
+            {path: float(generator.uniform(low, high)) for path, (low, high) in ends}
+        )
+
+
+@dataclass(frozen=True)
+class Uncertainty:
+    """Draws parameters about the model's as a fit's covariance has them, within their bounds.
+
+    Attributes:
+        paths: parameters, `effect.parameter_unit`.
+        covariance: of them in file units, shape (paths, paths).
+    """
+
+    paths: Sequence[str]
+    covariance: Sequence[Sequence[float]]
+
+    def __call__(self, model: Model, generator: np.random.Generator) -> Model:
+        """The model with drawn values."""
+        known = {p: v for e in model.effects for k, v in model.values_in_files(e).items()
+                 if (p := f"{e}.{k}") in self.paths}  # fmt: skip
+        middle = [known[path] for path in self.paths]
+        drawn = generator.multivariate_normal(middle, self.covariance, method="eigh")
+        pairs = zip(self.paths, drawn.tolist(), strict=True)
+        return model.replace({path: _bounded(model, path, value) for path, value in pairs})
 
 
 Randomisation = Callable[[Model, np.random.Generator], Model]

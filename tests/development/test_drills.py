@@ -109,7 +109,7 @@ CATALOGUE = ("tests/effects/conftest.py", "tests/effects/test_catalogue.py")
             *(["tests/test_tasks.py", "tests/tasks", "-k", "smooth_step"], 4),
         ),
         pytest.param(
-            *("add-a-rig.md", 3, (), ["tests/plant/test_vertical_slide.py"], 3),
+            *("add-a-rig.md", 3, (), ["tests/plant/test_vertical_slide.py"], 4),
             marks=pytest.mark.campaign,
         ),
         pytest.param(

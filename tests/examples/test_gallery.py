@@ -19,6 +19,7 @@ GALLERY = (
         "hidden_effect",
         "joint",
         "servo_pendulum",
+        "logs_to_policy",
         "servo_wheel",
         "tensile_test",
     ),

@@ -47,7 +47,7 @@ def test_a_joint_settles_at_its_start_without_a_pressure_and_is_called_a_joint()
     assert dict(zip(Plant(model).states, rest.state, strict=True))["angle"] == np.radians(20.0)
     with pytest.raises(ValueError, match="model joint is of a joint without a regulator.*300 kPa"):
         Plant(model).settle(pressure=300e3)
-    with pytest.raises(ValueError, match='plant = "joint", which has no muscle'):
+    with pytest.raises(ValueError, match='plant = "joint": make it with gym.make'):
         PMAEnv("rotation", model=model)
 
 

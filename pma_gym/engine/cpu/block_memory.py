@@ -3,7 +3,7 @@
 The lanes of a block are environments side by side, so that a vector holds one number of each.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Protocol
 
 from llvmlite import ir
@@ -50,15 +50,27 @@ class KernelSpec(Protocol):
 
     Attributes:
         abreast: how many of the readings that zero the sensors are computed at once.
+        graph_type: the parts of a control step.
     """
 
     program: Program
-    state_layout: StateLayout
+
+    @property
+    def state_layout(self) -> StateLayout:
+        """Places of an environment's numbers."""
+        ...
+
     observed: ObservationTable
     width: int
     abreast: int
     single: bool
     draws: bool
+    graph_type: type[ControlStepGraph]
+
+    @property
+    def equations_type(self) -> Callable[..., PlantEquations]:
+        """What makes the plant's equations."""
+        ...
 
 
 class BlockMemory:
@@ -78,9 +90,9 @@ class BlockMemory:
         self.kernel, self.state_layout, self.width = kernel, kernel.state_layout, kernel.width
         self.element: ir.Type = DOUBLE
         self.offsets = kernel.state_layout.offsets
-        self.eq = PlantEquations(model.effects, model.parameters)
+        self.eq = kernel.equations_type(model.effects, model.parameters)
         model.rig.write_equations(self.eq)
-        self.step_graph = ControlStepGraph(kernel.state_layout, self.eq)
+        self.step_graph = kernel.graph_type(kernel.state_layout, self.eq)
         self.fixed: list[Value] = []
 
     def _arguments(self, b: Builder, arguments: Operand) -> dict[str, Operand]:

@@ -41,7 +41,7 @@ class Writer(ResetWriter):
     def __init__(self, kernel: KernelSpec) -> None:
         super().__init__(kernel)
         self.attempt = step_attempt(self.eq, kernel.program.model.rig.position_tolerances)
-        self.course: Course = course(self.eq, self.attempt, kernel.state_layout.task)
+        self.course: Course = course(self.eq, self.attempt, self.step_graph.followed)
         extra = [*self.course.values, self.attempt.accepted, self.attempt.length]
         layout = Layout.of(self.attempt, extra)
         self.extra = extra
@@ -202,7 +202,7 @@ class Writer(ResetWriter):
                 b.store(job, lane.job(k))
                 if self.width == 1:
                     steps = b.load(address(job, "count"), typ=INTEGER)
-                    voltage = number(job, f"{self.state_layout.task.actuator}_voltage")
+                    voltage = number(job, self.state_layout.recorded)
                     b.store(voltage, offset(b, given["voltages"], steps))
                 for name in kept:
                     lane.put(values[name], k, lane.narrow(number(job, name)))

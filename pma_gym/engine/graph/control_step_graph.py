@@ -14,11 +14,10 @@ from pma_gym.engine.actions import HIGHEST_VOLTAGE
 from pma_gym.engine.graph.exercise_step import ExerciseStep, StepInputs, held_volts
 from pma_gym.engine.graph.scoring import position_of
 from pma_gym.engine.observation import BOUND, ObservationTable, Prescribed, measured_position
-from pma_gym.engine.state_layout import HAND_PUSH, NOISE, PARTS, TRUTH
+from pma_gym.engine.state_layout import NOISE, PARTS, TRUTH
 from pma_gym.integrator.integration import step_start_values
 from pma_gym.integrator.step_attempt import first_size
 from pma_gym.plant import sensors
-from pma_gym.plant.rigs.station import STATION
 from pma_gym.tasks import REWARDS, broken, missed_reward
 from pma_gym.units import SI_FACTORS
 
@@ -52,7 +51,7 @@ class ControlStepGraph(StepInputs):
             asked = self.action(i)
             held.append(where(asked < -1.0, -1.0, where(asked > 1.0, 1.0, asked)))
         new: dict[str, Value] = {f"action_{i}": value for i, value in enumerate(held)}
-        volts = [0.5 * HIGHEST_VOLTAGE * (value + 1.0) for value in held]
+        volts = [self.asked(i, value) for i, value in enumerate(held)]
         if options.action_delay:
             received = [self.slot(f"wire_0_{i}") for i in range(state_layout.actions)]
             line = [
@@ -63,15 +62,7 @@ class ControlStepGraph(StepInputs):
                 new |= {f"wire_{k}_{i}": value for i, value in enumerate(values)}
         else:
             received = volts
-        if self.exercise_step:
-            regulator, filtered = self.exercise_step.keep_safe(received[0])
-            new |= self.exercise_step.operate() | filtered
-        elif state_layout.task.actuator == "regulator":
-            new["motor_voltage"], regulator = self.slot("rest_motor"), received[0]
-        else:
-            new["motor_voltage"] = received[0]
-            regulator = received[1] if options.regulator_action else self.slot("rest_regulator")
-        new["regulator_voltage"] = self._disturbed(regulator)
+        new |= self.received(received)
         change = self.graph.constant(0.0)
         for i, value in enumerate(held):
             moved = abs(value - self.slot(f"action_{i}"))
@@ -81,10 +72,29 @@ class ControlStepGraph(StepInputs):
         other = abs(new["regulator_voltage"] - self.slot("regulator_voltage"))
         jump = where(other > jump, other, jump)
         if any(name.startswith("pulse_") for name in self.state_layout.events):
-            new[HAND_PUSH] = self._pulse()
-            pulled = abs(new[HAND_PUSH] - self.slot(HAND_PUSH)) * (1.0 / FORCE_OF_A_VOLT)
+            push = state_layout.push
+            new[push] = self.pushed()
+            pulled = abs(new[push] - self.slot(push)) * (1.0 / FORCE_OF_A_VOLT)
             jump = where(pulled > jump, pulled, jump)
         new["size"] = first_size(self.slot("size"), jump)
+        return new
+
+    def asked(self, i: int, action: Value) -> Value:
+        """Command that an entry of an action asks for (V)."""
+        return 0.5 * HIGHEST_VOLTAGE * (action + 1.0)
+
+    def received(self, volts: list[Value]) -> dict[str, Value]:
+        """Commands of motor and regulator for those that have arrived (V)."""
+        options, new = self.state_layout.options, {}
+        if self.exercise_step:
+            regulator, filtered = self.exercise_step.keep_safe(volts[0])
+            new |= self.exercise_step.operate() | filtered
+        elif self.state_layout.task.actuator == "regulator":
+            new["motor_voltage"], regulator = self.slot("rest_motor"), volts[0]
+        else:
+            new["motor_voltage"] = volts[0]
+            regulator = volts[1] if options.regulator_action else self.slot("rest_regulator")
+        new["regulator_voltage"] = self._disturbed(regulator)
         return new
 
     def _disturbed(self, regulator: Value) -> Value:
@@ -98,7 +108,7 @@ class ControlStepGraph(StepInputs):
             volts = volts + where(now >= self.slot(name), size, 0.0)
         return held_volts(volts)
 
-    def _pulse(self) -> Value:
+    def pushed(self) -> Value:
         """Force of the hand in the step that begins (N)."""
         now, force = to_real(self.slot("count")), self.graph.constant(0.0)
         for name in self.state_layout.events:
@@ -111,12 +121,12 @@ class ControlStepGraph(StepInputs):
     def truth(self) -> dict[str, Value]:
         """True outputs at the plant's state."""
         eq = self.equations
-        outputs = [eq.outputs[name] for name in TRUTH]
-        return dict(zip(TRUTH, substitute(outputs, step_start_values(eq)), strict=True))
+        outputs = substitute(list(eq.outputs.values()), step_start_values(eq))
+        return dict(zip(eq.outputs, outputs, strict=True))
 
     def read(self, stream: int, count: Value) -> list[Value]:
-        """Measurements of the four sensors (SI), with random numbers of a stream."""
-        eq, truth, signals = self.equations, self.truth(), STATION.signals
+        """Measurements of the sensors (SI), with random numbers of a stream."""
+        eq, truth, signals = self.equations, self.truth(), self.state_layout.signals
         measured = [(signal.sensor, signal.name) for signal in signals]
         lagged = [
             eq[f"lag_{name}"] if f"lag_{name}" in self.state_layout.states else truth[output]
@@ -124,12 +134,13 @@ class ControlStepGraph(StepInputs):
         ]
         if not self.state_layout.options.noise:
             return lagged
-        words = philox(
-            (count, self.slot("episode") * 4 + stream, self.graph.constant(0, "integer"), 0),
-            (self.slot("key_0"), self.slot("key_1")),
-        )
+        key, drawn = (self.slot("key_0"), self.slot("key_1")), []
+        # Four numbers of each counter.
+        for block in range(0, len(signals), 4):
+            own = self.slot("episode") * 4 + stream, self.graph.constant(block, "integer"), 0
+            drawn += normals(philox((count, *own), key))
         said = []
-        for held, normal, signal in zip(lagged, normals(words), signals, strict=True):
+        for held, normal, signal in zip(lagged, drawn, signals, strict=False):
             parameters = eq.parameters.get(signal.sensor)
             level = getattr(parameters, "noise", self.graph.constant(0.0))
             said.append(sensors.reading(held, level, normal, signal.calibration))
@@ -192,6 +203,11 @@ class ControlStepGraph(StepInputs):
         if self.exercise_step:
             values += self.exercise_step.info(sensed)
         return dict(zip(state_layout.info, values, strict=True))
+
+    @property
+    def followed(self) -> Value:
+        """Position of the task's controlled quantity within a step attempt (m or rad)."""
+        return position_of(self.equations, self.state_layout.task, self.equations.outputs)
 
     def position(self, sensed: Mapping[str, Value]) -> Value:
         """True position of the task's controlled quantity (m or rad)."""

@@ -41,9 +41,8 @@ class Course:
         return [self.start, self.speed, self.acceleration, self.end, self.end_speed]
 
 
-def course(eq: Equations, attempt: StepAttempt, task: Task) -> Course:
-    """Course of the task's position during a step attempt."""
-    position = position_of(eq, task, eq.outputs)
+def course(eq: Equations, attempt: StepAttempt, position: Value) -> Course:
+    """Course of a position during a step attempt."""
     speed = _rate(eq, position)
     acceleration = _rate(eq, speed)
     begin = {**attempt.frozen, **attempt.here}

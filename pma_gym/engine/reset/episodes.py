@@ -51,7 +51,7 @@ class Episodes(EngineMemory):
         """Check the pressures that are asked for, then compile."""
         self.task, self.nominal_model = task, nominal_model(task, options.nominal)
         # The very same model where nothing is added: its plant is known by that.
-        rig = rig_model(task, replace(options, model=self.nominal_model))
+        rig = self._rig_model(replace(options, model=self.nominal_model))
         nominal = Plant(rig, options.tolerance)
         self.rest_motor = motor_at_rest(self.nominal_model, task)
         usual = [options.pressure_kpa] * count if pressures is None else pressures
@@ -66,6 +66,10 @@ class Episodes(EngineMemory):
         # Of steps, which have theirs elsewhere.
         self._reset_arguments[ARGUMENTS.index("attempts")] = 0
         self._reset_address = self._reset_arguments.ctypes.data
+
+    def _rig_model(self, options: Options) -> Model:
+        """The nominal model with the effects of task and options."""
+        return rig_model(self.task, options)
 
     def seed(self, indices: NDArray[np.int64], seeds: Sequence[int | None]) -> None:
         """Seed the random numbers of environments; None keeps an environment's present seed."""
@@ -272,7 +276,8 @@ class Episodes(EngineMemory):
     ) -> None:
         """Draw what will disturb episodes: the control steps it comes with, and its sizes."""
         events = self._events(indices)
-        gain = self.nominal_model.parameters["regulator_line"].gain
+        line = self.nominal_model.parameters.get("regulator_line")
+        gain = line.gain if line else 1.0
         rate = self.options.control_rate_hz
         for what, times, sizes in (
             ("jump", events.step_times, events.step_sizes / gain),

@@ -72,4 +72,5 @@ JOINT = Rig(
     inertia=("inertia", "inertia"),
     moving_lags={"lag_encoder": "spin"},
     direct_commands={"torque_drive": "torque_command", "dc_motor": "winding_voltage"},
+    push_port="joint_torque",
 )

@@ -213,6 +213,7 @@ _ASKED = ("regulator_lag", "regulator_second_order", "pressure_loop")
 MUSCLE_JOINT = Rig(
     name="muscle_joint",
     signals=signals("angle", "load", "pressure"),
+    push_port="joint_torque",
     ports=MUSCLE_JOINT_PORTS,
     parts=("inertia", "joint_range"),
     position_tolerances={"angle": 0.001},

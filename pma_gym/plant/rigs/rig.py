@@ -65,6 +65,7 @@ class Rig:
             speed.
         drive_port: port of the drive whose force moves a free rig.
         inertia: part and field of what the net force accelerates; empty where no one part is that.
+        push_port: port at which a force from outside adds to what moves; "" for none.
         imposes_motion: whether the drive follows a record of positions and the force is an output.
         direct_commands: for each drive, the command in SI that it takes without a voltage
             calibration.
@@ -88,6 +89,7 @@ class Rig:
     is_diagnosable: bool = False
     drive_port: str = ""
     inertia: tuple[str, ...] = ()
+    push_port: str = ""
     imposes_motion: bool = False
     needed_ports: Mapping[str, str] = field(default_factory=dict)
     modifying_ports: tuple[str, ...] = ()

@@ -99,4 +99,5 @@ SLIDE = Rig(
     drive_port="two_way_drive",
     inertia=("slide", "mass"),
     moving_lags={"lag_lvdt": "velocity"},
+    push_port="slide_force",
 )

@@ -126,4 +126,5 @@ STATION = Rig(
     shipped_example="serres2008",
     balances_loads=True,
     is_diagnosable=True,
+    push_port="slide_force",
 )

@@ -110,11 +110,11 @@ def test_a_refit_comes_nearer_to_the_tables_than_the_printed_numbers():
 
 @pytest.mark.campaign
 def test_a_job_judges_what_a_diagnosis_adds_as_the_notebook_has_it(monkeypatch, tmp_path):
-    found = iter(["nonlinear_stiffness", ""])
+    added = iter(["nonlinear_stiffness", ""])
 
     def diagnose(data, model, **_):
-        added = [SimpleNamespace(name=name, why=ADDED) for name in [next(found)] if name]
-        return SimpleNamespace(sentence="", verdict="effect", candidates=added, model=model)
+        named = [SimpleNamespace(name=name, why=ADDED) for name in [next(added)] if name]
+        return SimpleNamespace(sentence="", verdict="effect", candidates=named, model=model)
 
     monkeypatch.setattr(diagnose_tables, "diagnose", diagnose)
     extension = [each["extension_mm"] for each in run_measured(tmp_path).values()]

@@ -1,0 +1,1 @@
+"""Controllers compared on any rig, and a controller made from logs."""

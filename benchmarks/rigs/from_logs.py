@@ -1,0 +1,191 @@
+"""From logs to a controller: diagnose, tune and train on the amended and the given model, score."""
+
+import hashlib
+import json
+from collections.abc import Mapping, Sequence
+from itertools import combinations
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.progress import Progress
+
+from benchmarks.files import csv_text, write_text
+from benchmarks.rigs.policy import SEES, STEPS, RigPolicy, train
+from benchmarks.rigs.score import Score, score_table, scores
+from benchmarks.rigs.tune import tuned
+from controllers.rigs import RIG_CONTROLLERS, RigController
+from pma_gym.cli.terminal import print_table
+from pma_gym.data.datasets.dataset import Dataset, read_dataset
+from pma_gym.data.trial_columns import BY_QUANTITY
+from pma_gym.pages.document import Block, Heading, Paragraph, to_html
+from pma_gym.plant.model import Model, dump_model, load_model
+from pma_gym.plant.sensors import direct_command
+from pma_gym.tasks import Uncertainty
+
+RATE_HZ = 50.0
+"""Control rate."""
+
+QUANTILE = 1.96
+"""Standard deviations of half a 95 % interval."""
+
+BANDWIDTH_HZ = 1000.0
+"""Of a sensor of which the logs tell the noise alone (assumption)."""
+
+CONTROLLERS = ("feedforward", "pid", "feedforward_pid", "lqg")
+SEEDS = range(5)
+
+
+def amended(folder: Path) -> tuple[Model, Uncertainty]:
+    """The model of a diagnosis with the sensors' noise, and how uncertain its parameters are.
+
+    Args:
+        folder: of the diagnosis.
+    """
+    model = load_model(folder / "model.toml")
+    document = json.loads((folder / "diagnosis.json").read_text(encoding="utf-8"))
+    ends = {
+        f"{effect['name']}.{name}": each
+        for effect in document["effects"]
+        for name, each in effect["parameters"].items()
+    }
+    ends |= {path: {**each, "value": each["to"]} for path, each in document["parameters"].items()}
+    known = {
+        path: each
+        for path, each in ends.items()
+        if path in set(model.paths()) and isinstance(each["low"], int | float)
+    }
+    paths = list(known)
+    errors = np.array([(e["high"] - e["low"]) / (2.0 * QUANTILE) for e in known.values()])
+    correlation = np.eye(len(paths))
+    for i, j in combinations(range(len(paths)), 2):
+        first, second = known[paths[i]], known[paths[j]]
+        # Two that were fitted as one number move as one.
+        if (first["value"], first["low"]) == (second["value"], second["low"]):
+            correlation[i, j] = correlation[j, i] = 1.0
+    covariance = (correlation * np.outer(errors, errors)).tolist()
+    return with_noise(model, document["floors"]), Uncertainty(tuple(paths), covariance)
+
+
+def with_noise(model: Model, floors: Mapping[str, Any]) -> Model:
+    """A model with the sensors that a diagnosis tells the noise of, where it has none."""
+    for signal in model.rig.signals:
+        column = BY_QUANTITY[signal.name]
+        floor = floors.get(column.name)
+        if floor is not None and signal.sensor and signal.sensor not in model.parameters:
+            noise = float(np.hypot(floor["value"], (floor["step"] or 0.0) / 12**0.5))
+            values = {
+                "bandwidth_hz": BANDWIDTH_HZ,
+                column.name.replace(signal.name, "noise"): noise,
+            }
+            model = model.with_effects({signal.sensor: values})
+    return model
+
+
+def logged_options(dataset: Dataset, model: Model) -> dict[str, Any]:
+    """Options of the environment as the logs went: limits of the commands, range of the signal."""
+    trials = [each.trial for each in dataset.trials]
+    options: dict[str, Any] = {"control_rate_hz": RATE_HZ}
+    direct = direct_command(model)
+    if direct:
+        most = max(float(np.nanmax(np.abs(trial.commands[direct]))) for trial in trials)
+        options["limits"] = {direct: [-most, most]}
+    for signal in model.rig.signals:
+        rows = [t.measurements[signal.name] for t in trials if signal.name in t.measurements]
+        if rows:
+            options["span"] = 0.5 * float(np.nanmax([np.ptp(row[~np.isnan(row)]) for row in rows]))
+            return options | {"signal": signal.name}
+    raise ValueError("the logs measure none of the rig's signals")
+
+
+def run_from_logs(
+    logs: Path,
+    initial_model: str | None,
+    diagnosis: Path,
+    out: Path,
+    progress: Progress,
+    steps: int = STEPS,
+) -> list[Score]:
+    """Tune and train on the amended and the given model, and score all on both.
+
+    What is done is kept in the folder, from which the same command goes on.
+
+    Args:
+        logs: data set.
+        initial_model: name or file of the model as it was given; that of the data set if None.
+        diagnosis: folder of the diagnosis.
+        out: folder of the results.
+        progress: shows how far it is.
+        steps: control steps of a policy's training.
+    """
+    dataset = read_dataset(logs)
+    better, uncertainty = amended(diagnosis)
+    start = load_model(initial_model or dataset.model or better)
+    document = json.loads((diagnosis / "diagnosis.json").read_text(encoding="utf-8"))
+    models = {"amended": better, "given": with_noise(start, document["floors"])}
+    options = logged_options(dataset, better)
+    signal = options.pop("signal")
+    tasks = [f"{signal}_{kind}" for kind in ("steps", "ramps", "multisine")]
+    made: dict[str, tuple[RigController, Mapping[str, Any], Model]] = {}
+    rigs = {
+        "amended": {**options, "model": better, "randomisation": uncertainty},
+        "given": {**options, "model": models["given"]},
+    }
+    for name, model in models.items():
+        write_text(out / f"{name}.toml", dump_model(model))
+        for controller in CONTROLLERS:
+            settings = settings_of(
+                out, f"{controller}-{name}", controller, rigs[name], tasks, progress
+            )
+            made[f"{controller} ({name})"] = RIG_CONTROLLERS[controller](settings), {}, model
+        file, bar = out / f"policy-{name}.zip", progress.add_task(f"policy, {name}", total=steps)
+        train(
+            rigs[name],
+            signal,
+            file,
+            lambda done, _, bar=bar: progress.update(bar, completed=done),
+            steps,
+        )
+        made[f"policy ({name})"] = RigPolicy(file, rigs[name]), SEES, model
+    rows = [
+        row
+        for rig, own in rigs.items()
+        for controller, (which, sees, model) in made.items()
+        for row in scores(rig, own, {controller: (which, sees)}, tasks, SEEDS, model)
+    ]
+    write_report(out, f"Controllers of {dataset.title or logs.name}", rows, document["sentence"])
+    return rows
+
+
+def settings_of(
+    out: Path,
+    key: str,
+    controller: str,
+    options: Mapping[str, Any],
+    tasks: Sequence[str],
+    progress: Progress,
+) -> dict[str, float]:
+    """Settings of a controller from the folder, or by a search for this environment."""
+    file = out / f"{key}.json"
+    digest = hashlib.sha256(repr(sorted(options.items())).encode()).hexdigest()[:16]
+    kept = json.loads(file.read_text(encoding="utf-8")) if file.exists() else {}
+    if kept.get("environment") != digest:
+        bar = progress.add_task(key, total=None)
+        settings = tuned(
+            controller,
+            options,
+            tasks,
+            lambda n, total: progress.update(bar, completed=n, total=total),
+        )
+        kept = {"environment": digest, "settings": settings}
+        write_text(file, json.dumps(kept) + "\n")
+    return kept["settings"]
+
+
+def write_report(out: Path, title: str, rows: Sequence[Score], said: str = "") -> None:
+    """Write `scores.csv` and `report.html`, and print the table."""
+    table = score_table(rows)
+    write_text(out / "scores.csv", csv_text([Score._fields, *rows]))
+    blocks: list[Block] = [Heading(title, 1), *([Paragraph(said)] if said else []), table]
+    write_text(out / "report.html", to_html(blocks, {}))
+    print_table(table)

@@ -1,0 +1,195 @@
+"""Controllers of any rig: by their model, tuned, trained, and from logs."""
+
+import json
+
+import numpy as np
+import pytest
+
+from benchmarks.rigs import from_logs, run, tune
+from benchmarks.rigs.score import run_episode, scores
+from controllers.rigs import RIG_CONTROLLERS, Feedforward, RigLQG, RigPID
+from pma_gym import Plant, Trial
+from pma_gym.data.files.trial_files import write_trial
+from pma_gym.envs import RigEnv
+from pma_gym.plant.model import dump_model, parse_model
+
+HEAD = {"schema": 1, "name": "arm", "title": "a rig of a test"}
+JOINT = parse_model(
+    HEAD
+    | {
+        "plant": "joint",
+        "torque_drive": {"gain": 1.0},
+        "joint_weight": {"moment_n_m": 0.2, "offset_deg": 0.0},
+        "joint_damping": {"coefficient_n_m_s": 0.02},
+        "inertia": {"inertia_kg_m2": 0.0049},
+        "joint_start": {"angle_deg": 0.0, "spin_deg_per_s": 0.0},
+        "encoder": {"bandwidth_hz": 500, "noise_deg": 0.02},
+    }
+)
+SLIDE = parse_model(
+    HEAD
+    | {
+        "plant": "slide",
+        "two_way_drive": {"gain_n_per_v": 20, "middle_v": 5},
+        "slide": {"mass_kg": 2.0},
+        "start": {"contraction_mm": 5.0, "velocity_mm_per_s": 0.0},
+        "lvdt": {"bandwidth_hz": 300, "noise_mm": 0.02},
+    }
+)
+RIGS = {
+    "joint": ({"model": JOINT, "limits": {"torque_command": [-0.5, 0.5]}, "span": 1.0}, "angle"),
+    "slide": ({"model": SLIDE, "span": 0.05}, "contraction"),
+    "station": ({"model": "station", "rest": {"pressure_command": 300e3}}, "contraction"),
+}
+
+
+@pytest.fixture(params=RIGS)
+def rig(request):
+    """Options of an environment of a rig, and a signal of it."""
+    options, signal = RIGS[request.param]
+    return options | {"duration_s": 3.0, "control_rate_hz": 50.0}, signal
+
+
+@pytest.mark.parametrize("late", [{}, {"action_delay_s": 0.06}])
+def test_the_nominal_rig_follows_its_feedforward(rig, late):
+    options, signal = rig
+    env = RigEnv(f"{signal}_multisine", noise=False, **options, **late)
+    info, *_ = run_episode(env, Feedforward({}), 0)
+    # A station's cable hangs slack where episodes begin: that way is lost to every controller.
+    assert info["percent_of_range"] < (
+        0.5 if signal == "angle" or options["model"] is SLIDE else 20.0
+    )
+
+
+@pytest.mark.parametrize("late", [{}, {"action_delay_s": 0.02, "observation_delay_s": 0.02}])
+def test_an_unknown_load_is_left_to_the_feedback(late):
+    """The disturbance's estimate takes a constant load off; the plan alone runs away from it."""
+    options, _ = RIGS["slide"]
+    env = RigEnv(
+        "contraction_steps", load=2.0, duration_s=6.0, control_rate_hz=50.0, **options, **late
+    )
+    errors = {}
+    for controller in (Feedforward({}), RigLQG(RigLQG.settings)):
+        info, *_ = run_episode(env, controller, 0)
+        errors[controller.name] = info["percent_of_range"]
+    assert errors["lqg"] < 0.01 * errors["feedforward"]
+
+
+def test_a_search_finds_better_settings_and_repeats_itself(monkeypatch):
+    monkeypatch.setattr(tune, "EVALUATIONS", 25)
+    options = RIGS["joint"][0] | {"duration_s": 2.0, "control_rate_hz": 50.0}
+    best = tune.tuned("pid", options, ["angle_steps"])
+    assert best == tune.tuned("pid", options, ["angle_steps"]) and set(best) == set(RigPID.settings)
+    env = RigEnv("angle_steps", **options)
+    errors = [
+        run_episode(env, RigPID(s), 5)[0]["percent_of_range"] for s in (RigPID.settings, best)
+    ]
+    assert errors[1] < errors[0]
+
+
+def test_what_is_drawn_is_what_a_fit_could_change():
+    assert list(run.varied(JOINT)) == [
+        "joint_weight.moment_n_m", "joint_damping.coefficient_n_m_s", "inertia.inertia_kg_m2",
+    ]  # fmt: skip
+    options = run.rig_options("station", "span = 0.02\nlimits = {load_command = [0, 400]}")
+    env = RigEnv(**options)
+    assert env.task.schedule.span == 0.02 and env.options.commands[0].limits == pytest.approx(
+        (0, 400)
+    )
+
+
+@pytest.fixture
+def lab(tmp_path):
+    """Logs of a pendulum with more weight than its model has, and their diagnosis."""
+    logs, answer = tmp_path / "lab", tmp_path / "diagnosis"
+    logs.mkdir()
+    answer.mkdir()
+    better = JOINT.replace({"joint_weight.moment_n_m": 0.3})
+    time = np.arange(200) / 100.0
+    asked = Trial(time, {"torque_command": 0.4 * np.sin(4.0 * time)})
+    write_trial(Plant(better).simulate(asked), logs / "swing.csv")
+    (logs / "model.toml").write_text(dump_model(JOINT), encoding="utf-8")
+    (logs / "dataset.toml").write_text('title = "A swing"\nmodel = "model.toml"\n')
+    (answer / "model.toml").write_text(dump_model(better), encoding="utf-8")
+    document = {
+        "sentence": "The weight is 0.3 N m.",
+        "effects": [],
+        "parameters": {
+            "joint_weight.moment_n_m": {"from": 0.2, "to": 0.3, "low": 0.28, "high": 0.32}
+        },
+        "floors": {"angle_deg": {"value": 0.02, "step": None}},
+    }
+    (answer / "diagnosis.json").write_text(json.dumps(document), encoding="utf-8")
+    return logs, answer, tmp_path / "out"
+
+
+class Silent:
+    """Progress that nobody sees."""
+
+    def add_task(self, *words, **sizes):
+        return 0
+
+    def update(self, *bars, **sizes):
+        pass
+
+
+def test_logs_become_controllers_and_scores_and_a_second_run_goes_on(lab, monkeypatch, capsys):
+    logs, answer, out = lab
+    monkeypatch.setattr(tune, "EVALUATIONS", 6)
+    monkeypatch.setattr(from_logs, "SEEDS", range(1))
+    monkeypatch.setattr(from_logs, "CONTROLLERS", ("feedforward", "pid"))
+    arguments = logs, None, answer, out, Silent()
+    rows = from_logs.run_from_logs(*arguments, steps=5120)
+    names = {row.controller for row in rows}
+    assert names == {
+        f"{name} ({model})" for name in (*from_logs.CONTROLLERS, "policy")
+        for model in ("amended", "given")
+    }  # fmt: skip
+    assert {row.rig for row in rows} == {"amended", "given"}
+    assert len((out / "scores.csv").read_text().splitlines()) == len(rows) + 1
+    assert "The weight is 0.3 N m." in (out / "report.html").read_text()
+    error = {(r.rig, r.controller): r.percent for r in rows if r.task == "angle_multisine"}
+    assert error["amended", "feedforward (amended)"] < error["amended", "feedforward (given)"]
+    assert error["given", "feedforward (given)"] < error["given", "feedforward (amended)"]
+    kept = {path: path.stat().st_mtime_ns for path in out.glob("p*")}
+    again = from_logs.run_from_logs(*arguments, steps=5120)
+    assert [row[:7] for row in again] == [row[:7] for row in rows]
+    assert {path: path.stat().st_mtime_ns for path in out.glob("p*")} == kept
+
+
+def test_uncertainty_is_as_wide_as_the_intervals(lab):
+    _, uncertainty = from_logs.amended(lab[1])
+    assert uncertainty.paths == ("joint_weight.moment_n_m",)
+    assert uncertainty.covariance[0][0] ** 0.5 == pytest.approx(0.04 / (2 * 1.96))
+
+
+def test_a_controller_says_which_rigs_it_is_for(monkeypatch, tmp_path):
+    monkeypatch.setattr(RigPID, "missing", classmethod(lambda cls, info: "no brake"))
+    options = RIGS["joint"][0]
+    with pytest.raises(ValueError, match="pid does not apply to model arm: no brake"):
+        run.chosen_controllers(["pid"], options, ["angle_steps"], tmp_path, Silent())
+    with pytest.raises(ValueError, match="a controller of any rig is feedforward, pid"):
+        run.chosen_controllers(["pda"], options, ["angle_steps"], tmp_path, Silent())
+
+
+def test_settings_are_kept_for_the_environment_that_they_were_found_on(monkeypatch, tmp_path):
+    monkeypatch.setattr(tune, "EVALUATIONS", 4)
+    options = RIGS["joint"][0] | {"duration_s": 1.0, "control_rate_hz": 50.0}
+    searches = []
+
+    class Watched(Silent):
+        def add_task(self, *words, **sizes):
+            searches.append(words)
+            return 0
+
+    for span in (1.0, 1.0, 0.5):
+        table = options | {"span": span}
+        run.chosen_controllers(["pid"], table, ["angle_steps"], tmp_path, Watched())
+    assert len(searches) == 2
+
+
+def test_controllers_are_compared_under_the_same_noise():
+    options = RIGS["joint"][0] | {"duration_s": 1.0}
+    made = {"a": (Feedforward({}), {}), "b": (RIG_CONTROLLERS["feedforward"]({}), {})}
+    rows = scores("arm", options, made, ["angle_ramps"], range(2))
+    assert [row.percent for row in rows[:2]] == [row.percent for row in rows[2:]]
