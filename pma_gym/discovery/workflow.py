@@ -141,6 +141,8 @@ class _Work:
         dataset, given = self._input()
         named, words = prepared(dataset.trials, given)
         trials = [each.trial for each in named]
+        given, slower = with_recorded_bandwidth(given, trials)
+        words = (*words, *slower)
         if given.plant in PORTS:
             every = _candidates(given, named) if search else None
             own = free_parameters(given)
@@ -151,8 +153,7 @@ class _Work:
             )
             words = (*(dataset.checked or ()), *words, *said.warnings)
             return replace(said, warnings=words, seconds=dict(self.seconds))
-        given, slower = with_recorded_bandwidth(given, trials)
-        words = (*(dataset.checked or ()), *words, *slower)
+        words = (*(dataset.checked or ()), *words)
         journal = Journal(self.folder, trials, given, f"diagnosis 7 seed {self.seed}")
         logged = [Logged.of(given, i, trial) for i, trial in enumerate(trials)]
         floors = self._timed("noise", lambda: initial_floors(given, logged, named, dataset.sensors))

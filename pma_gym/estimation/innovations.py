@@ -15,8 +15,16 @@ from pma_gym.effects.effect import Effect
 from pma_gym.effects.ports import SENSOR_DELAY
 from pma_gym.effects.slide.coulomb_friction import friction_path
 from pma_gym.estimation.logged import Logged
-from pma_gym.integrator.filter_kernel import FilterEquations, parameter_slots, write_filter
+from pma_gym.integrator.filter_kernel import (
+    FilterEquations,
+    parameter_slots,
+    used_commands,
+    write_filter,
+)
+from pma_gym.integrator.equations import ZERO
+from pma_gym.plant.compiled_model import CompiledModel
 from pma_gym.plant.composition import PlantEquations
+from pma_gym.plant.equilibrium.solver import equilibria_at
 from pma_gym.plant.model import Model
 from pma_gym.plant.program import parameter_names, structure
 from pma_gym.units import Quantity
@@ -25,10 +33,13 @@ Array = NDArray[np.float64]
 
 LATENT = "latent_force"
 
-PORTS = {"slide": "slide_force", "joint": "joint_torque"}
-"""Where the latent force acts, by rig: drive and load act on one mass, so they are one place."""
+PORTS = {"slide": "slide_force", "joint": "joint_torque", "imposed": "contact_force"}
+"""Where the latent force acts, by rig: drive and load act on one mass, so they are one place.
 
-SPEEDS = {"slide": "velocity", "joint": "spin"}
+Where a motion is imposed it is in series with what is measured.
+"""
+
+SPEEDS = {"slide": "velocity", "joint": "spin", "imposed": "velocity"}
 """The state that is the speed, by rig."""
 
 TREND, TRIAL = "~", "@"
@@ -63,12 +74,14 @@ class Kernel:
         call: the compiled function, see `filter_kernel.ARGUMENTS`.
         slots: names of the parameters that it takes.
         states: names of its states.
+        commands: which commands it takes.
         width: lanes.
     """
 
     call: Callable
     slots: tuple[str, ...]
     states: tuple[str, ...]
+    commands: tuple[int, ...]
     width: int
 
     @property
@@ -119,7 +132,8 @@ def kernel(model: Model, channels: Sequence[int], keeps: bool = False) -> Kernel
         library = compiled(key, build, f"filter of {model.name}", brief=True)
         call = library.function("innovations", [ctypes.c_int64] * 2 + [ctypes.c_void_p] * 7)
         states = tuple(state.name for state in made.states)
-        _kernels[key] = Kernel(call, tuple(parameter_slots(made, keeps)), states, width)
+        slots, used = parameter_slots(made, keeps), used_commands(made)
+        _kernels[key] = Kernel(call, tuple(slots), states, tuple(used), width)
     return _kernels[key]
 
 
@@ -182,40 +196,40 @@ class Rows:
         self.there = self.readings[:, :, 1] > 0
         spans = np.diff(self.time)
         self.lengths = np.concatenate([[0.0], spans / steps])
-        self._motor, self._at = np.asarray(logged.motor, float), np.asarray(logged.time, float)
+        self._asked = np.stack([logged.motor, logged.regulator])
+        self._at = np.asarray(logged.time, float)
         between = np.diff(self._at)
-        rise = np.diff(self._motor) / between if linear else np.zeros(len(between))
-        self._slopes = np.append(rise, 0.0)
-        held = self._motor[:-1] * between + 0.5 * rise * between**2
-        self._sums = np.concatenate([[0.0], np.cumsum(held)])
+        rise = np.diff(self._asked) / between if linear else np.zeros((2, len(between)))
+        self._slopes = np.pad(rise, ((0, 0), (0, 1)))
+        held = self._asked[:, :-1] * between + 0.5 * rise * between**2
+        self._sums = np.pad(np.cumsum(held, axis=1), ((0, 0), (1, 0)))
         edges = self.time[:-1, None] + spans[:, None] * (np.arange(steps + 1) / steps)
         self._from, self._to = edges[:, :-1], edges[:, 1:]
         self._known: dict[float, Array] = {}
         self._starts: dict[tuple[int | None, int | None], tuple[float, float, float]] = {}
 
     @property
-    def first(self) -> float:
-        """Command in the first row."""
-        return float(self._motor[0])
+    def first(self) -> Array:
+        """Commands in the first row."""
+        return self._asked[:, 0]
 
     def commands(self, delay: float) -> Array:
-        """Mean command over each step, late by a delay; shape (rows, steps)."""
+        """Mean commands over each step, late by a delay; shape (commands, rows, steps)."""
         if delay not in self._known:
             if len(self._known) > MOST_KEPT:
                 self._known.clear()
             first, last = (self._integral(edge - delay) for edge in (self._from, self._to))
             mean = (last - first) / (self._to - self._from)
-            self._known[delay] = np.concatenate([np.full((1, self.steps), self.first), mean])
+            start = np.broadcast_to(self.first[:, None, None], (2, 1, self.steps))
+            self._known[delay] = np.concatenate([start, mean], axis=1)
         return self._known[delay]
 
     def _integral(self, at: Array) -> Array:
-        """Integral of the command up to given times; before the first row it is as there."""
+        """Integrals of the commands up to given times; before the first row they are as there."""
         place = np.interp(at, self._at, np.arange(len(self._at))).astype(int)
         beyond = at - self._at[place]
-        return (
-            self._sums[place]
-            + (self._motor[place] + 0.5 * self._slopes[place] * np.maximum(beyond, 0.0)) * beyond
-        )
+        slope = 0.5 * self._slopes[:, place] * np.maximum(beyond, 0.0)
+        return self._sums[:, place] + (self._asked[:, place] + slope) * beyond
 
     def begin(self, position: int | None, speed: int | None) -> tuple[float, float, float]:
         """First position and speed, with the speed's standard deviation, from the first rows."""
@@ -321,9 +335,21 @@ class GreyBox:
         points: Sequence[Point],
         kept: Array | None = None,
     ) -> Array:
-        commands = np.stack([trial.commands(point.delay) for point in points], axis=-1)
-        parameters = np.stack([self._vector(point, k.slots, number) for point in points], axis=-1)
-        start = np.stack([self._start(trial, point, number, k.states) for point in points], axis=-1)
+        commands = np.stack(
+            [np.moveaxis(trial.commands(p.delay)[list(k.commands)], 0, -1) for p in points], axis=-1
+        )
+        rests, zeros = self._rests(trial, points, number)
+        parameters = np.stack(
+            [self._vector(*each, k.slots, number) for each in zip(points, zeros, strict=True)],
+            axis=-1,
+        )
+        start = np.stack(
+            [
+                self._start(trial, *each, number, k.states)
+                for each in zip(points, rests, strict=True)
+            ],
+            axis=-1,
+        )
         out = np.empty((len(trial.time), len(self.channels), 2, len(points)))
         arrays = [
             np.ascontiguousarray(a)
@@ -333,8 +359,29 @@ class GreyBox:
         k.call(len(trial.time), trial.steps, *addresses, 0 if kept is None else kept.ctypes.data)
         return out
 
-    def _vector(self, point: Point, slots: Sequence[str], number: int) -> Array:
+    def _rests(
+        self, trial: Rows, points: Sequence[Point], number: int
+    ) -> tuple[Sequence[dict[str, float]], Sequence[float]]:
+        """States in equilibrium at the first commands, and x0 (m); nothing of a free rig."""
+        if self.model.rig.is_free:
+            return [{}] * len(points), [0.0] * len(points)
+        plant, names = CompiledModel(self.model), parameter_names(self.model)
+        vectors = np.array(
+            [
+                [
+                    plant.tolerance,
+                    *(value_in_trial(p, name, number, self.order) for name in names),
+                ]
+                for p in points
+            ]
+        )
+        motor, regulator = np.repeat(trial.first[:, None], len(points), axis=1)
+        states, zeros = equilibria_at(plant, motor, regulator, vectors)
+        return [dict(zip(plant.states, row, strict=True)) for row in states.tolist()], zeros.tolist()
+
+    def _vector(self, point: Point, zero: float, slots: Sequence[str], number: int) -> Array:
         own = {
+            ZERO: zero,
             f"{LATENT}.memory_time": point.memory,
             "process_noise": 2.0 * point.forces[number] ** 2 / point.memory,
         }
@@ -343,8 +390,26 @@ class GreyBox:
             [own[s] if s in own else value_in_trial(point, s, number, self.order) for s in slots]
         )
 
-    def _start(self, trial: Rows, point: Point, number: int, states: Sequence[str]) -> Array:
+    def _start(
+        self,
+        trial: Rows,
+        point: Point,
+        rest: Mapping[str, float],
+        number: int,
+        states: Sequence[str],
+    ) -> Array:
         """Mean and covariance at a trial's first row."""
+        if rest:
+            at = {name: (value, 0.0) for name, value in rest.items()}
+            at[f"memory_{LATENT}"] = 0.0, point.forces[number]
+            for effect in self.model.effects.values():
+                if effect.rate_independent_law is friction_path:
+                    at |= dict.fromkeys(effect.memory_names, (0.0, BRISTLE))
+            return _flat(at, states)
+        return _flat(self._moving(trial, point, number), states)
+
+    def _moving(self, trial: Rows, point: Point, number: int) -> dict[str, tuple[float, float]]:
+        """Means and deviations at the first row of a free rig."""
         signals, plant = self.model.rig.signals, self.model.plant
         position, speed = (signal.name for signal in signals[:2])
         where = {signals[channel].name: i for i, channel in enumerate(self.channels)}
@@ -365,7 +430,7 @@ class GreyBox:
             f"lag_{signals[0].sensor}": (first, level),
             f"lag_{signals[1].sensor}": (motion, spread),
         }
-        asked = self.asked(trial.first), 0.0
+        asked = self.asked(float(trial.first[0])), 0.0
         into = {
             "drive_delay": asked,
             "drive_lag": asked,
@@ -379,11 +444,7 @@ class GreyBox:
                 odd = way if effect.port == f"{SENSOR_DELAY}{position}" else 0.0
                 bristle = 0.0, BRISTLE if effect.rate_independent_law else odd
                 at[name] = into[effect.port] if passed else bristle
-        pairs = [at.get(name, (0.0, 0.0)) for name in states]
-        covariance = np.diag([deviation**2 for _, deviation in pairs])
-        return np.concatenate(
-            [[mean for mean, _ in pairs], covariance[np.tril_indices(len(states))]]
-        )
+        return at
 
     def asked(self, command: float) -> float:
         """What the drive asks for at a command (N; else the command itself)."""
@@ -391,6 +452,13 @@ class GreyBox:
         if drive is None or drive.law is None:
             return command
         return float(drive.law(command, self.model.parameters[drive.name]))
+
+
+def _flat(at: Mapping[str, tuple[float, float]], states: Sequence[str]) -> Array:
+    """Means, and the lower half of the covariance, of independent states; others are 0 for sure."""
+    pairs = [at.get(name, (0.0, 0.0)) for name in states]
+    covariance = np.diag([deviation**2 for _, deviation in pairs])
+    return np.concatenate([[mean for mean, _ in pairs], covariance[np.tril_indices(len(states))]])
 
 
 BRISTLE = 3.0**-0.5

@@ -72,6 +72,8 @@ class Conclusions:
         """The hypothesis that is proposed, without a delay that is not worth its price."""
         chosen = self._chosen
         prompt = [c for c in chosen.fit.coordinates if c.name != "delay"]
+        if len(prompt) == len(chosen.fit.coordinates):
+            return chosen
         made = fit(chosen.box, replace(chosen.fit.point, delay=0.0), prompt, chosen.fit.tied)
         least = chosen.fit.value - self.selection.price_of(chosen, 1) - LIKE
         return replace(chosen, fit=made) if made.value > least else chosen
@@ -449,12 +451,10 @@ class Conclusions:
     def states(self) -> dict[str, TrialState]:
         """What belongs to each trial: its start, and its own values."""
         out = {}
-        position, speed = self.selection.model.rig.start_paths.items()
+        paths = self.selection.model.rig.start_paths.values()
         for i, (each, smooth) in enumerate(zip(self.named, self._ended, strict=True)):
             values = {}
-            for (_, path), value in zip(
-                (position, speed), (smooth.position[0], smooth.speed[0]), strict=True
-            ):
+            for path, value in zip(paths, (smooth.position[0], smooth.speed[0]), strict=False):
                 values[path] = float(value) / SI_FACTORS[_unit(path)]
             for move in self.last.moves:
                 for name in move.slots:

@@ -10,6 +10,7 @@ from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
 from pma_gym.discovery.fitting.free_parameters import free_parameters, prior
 from pma_gym.discovery.grey_box.thresholds import FAINT, LIKE, LINE, LOUD, MOST_EFFECTS, ODD, TRIED
 from pma_gym.effects import CATALOGUE
+from pma_gym.effects.contact.imposed_motion import following_rate
 from pma_gym.effects.effect import signals
 from pma_gym.estimation.innovations import (
     TREND,
@@ -173,13 +174,18 @@ class EffectSelection:
         tell: Callable[[str, int, int], None] = lambda step, done, total: None,
     ) -> None:
         self.model, self.logged, self.seed, self.tell = model, list(logged), seed, tell
-        self.linear = linear
+        # An imposed motion is a record, and a line between its rows; it is no reading besides.
+        self.linear = model.rig.imposes_motion or linear
         self.channels = [
-            i for i in range(len(model.rig.signals)) if any(each.measures[i] for each in logged)
+            i
+            for i, signal in enumerate(model.rig.signals)
+            if any(each.measures[i] for each in logged)
+            and not (model.rig.imposes_motion and signal.is_position)
         ]
         # The delay between command and readings is free in every fit; a lag of the only sensor
         # is no other thing.
         late = DELAYS[:1] if len(self.channels) > 1 else (*DELAYS, *LAGS)
+        late = late if model.rig.is_free else ()
         self.candidates = [each for each in candidates if each.name not in late]
         readings = [
             [each.measured[c][each.counts[c] > 0] for each in logged] for c in self.channels
@@ -193,9 +199,11 @@ class EffectSelection:
         total = sum(len(each.time) for each in logged) / self.block
         self.stride = max(1, int(total / MOST_ROWS))
         seconds = sum(float(each.time[-1] - each.time[0]) for each in logged)
+        slowest = seconds / MOST_STEPS
+        if model.rig.imposes_motion:
+            slowest = max(slowest, 0.5 / following_rate(model.parameters["imposed_motion"]))
         self.substeps = {
-            rough: max(h, seconds / MOST_STEPS)
-            for rough, h in ((False, SUBSTEP_S), (True, ROUGH_SUBSTEP_S))
+            rough: max(h, slowest) for rough, h in ((False, SUBSTEP_S), (True, ROUGH_SUBSTEP_S))
         }
         self.span = (
             self.stride
@@ -208,6 +216,7 @@ class EffectSelection:
         self.noise = [n / self.block**0.5 for n in self.noise]
         self._rows: dict[tuple[int, bool], list[Rows]] = {}
         self.force = self._force()
+        self.pressed = any(each.regulator.any() for each in logged)
 
     def _block(self, readings: Sequence[Sequence[Array]]) -> int:
         total, block = sum(len(each.time) for each in self.logged), 1
@@ -236,7 +245,13 @@ class EffectSelection:
         return GreyBox(model, self._rows[steps, linear], self.channels)
 
     def _force(self) -> float:
-        """Force of the drive (N, N m) at the root mean square of its command."""
+        """Force of the drive (N, N m) at the root mean square of its command.
+
+        Where no drive moves the rig freely it is the change of the force that is measured.
+        """
+        if not self.model.rig.drive_port:
+            (channel,) = (i for i, each in enumerate(self.model.rig.signals) if each.is_force)
+            return float(np.std(np.concatenate([each.measured[channel] for each in self.logged])))
         motor = np.concatenate([each.motor for each in self.logged])
         middle = float(np.median(motor))
         level = float(np.sqrt(np.mean((motor - middle) ** 2))) or 1.0
@@ -270,7 +285,10 @@ class EffectSelection:
             name, quantity = slot(path), _quantity(path)
             effect, _, stem = name.partition(".")
             law = self.model.effects[effect]
-            if path in self.model.rig.start_paths.values() or quantity.unit.endswith("/kPa"):
+            pressed = quantity.unit.endswith("/kPa")
+            if path in self.model.rig.start_paths.values() or pressed and not self.pressed:
+                continue
+            if stem == "presliding":
                 continue
             tie = next((t for t in law.ties if stem in t[1:]), None)
             if tie and numbers[f"{effect}.{tie[0]}"] == numbers[f"{effect}.{tie[1]}"]:
@@ -284,7 +302,7 @@ class EffectSelection:
                 Coordinate(name, scale, inertial, lower, upper, 1.0 if inertial else spread / scale)
             )
         for effect in self.model.effects.values():
-            coordinates += [_presliding(effect.name)] if "presliding" in effect.scanned else []
+            coordinates += [_presliding(effect.name)] if "presliding" in effect.quantities else []
         return coordinates, tied
 
     def nuisances(self) -> list[Coordinate]:
@@ -301,7 +319,7 @@ class EffectSelection:
         least, most = self.memory
         memory = Coordinate("memory", 1.0, True, 0.75 * least, most)
         late = any(effect.port == "drive_delay" for effect in self.model.effects.values())
-        delay = [] if late else [Coordinate("delay", self.span, False, 0.0, MOST_DELAY * self.span)]
+        delay = [] if late or not self.model.rig.is_free else [Coordinate("delay", self.span, False, 0.0, MOST_DELAY * self.span)]
         return [*noise, *forces, memory, *delay]
 
     def base(self) -> Hypothesis:
@@ -468,13 +486,8 @@ class EffectSelection:
         )
         moves = []
         for c, slope in zip(mean, slopes, strict=True):
-            if (
-                c.logarithmic
-                and c.name.endswith("presliding")
-                or c.name in ("delay",)
-                or TREND in c.name
-                or TRIAL in c.name
-            ):
+            alone = TREND in c.name or TRIAL in c.name
+            if alone or c.name == "delay" or c.name.endswith("presliding"):
                 continue
             columns = {f"{c.name}{TREND}": slope * now.box.order[of]}
             columns |= {f"{c.name}{TRIAL}{i}": slope * (of == i) for i in range(count)}
@@ -487,11 +500,12 @@ class EffectSelection:
         return moves
 
     def _added(self, candidate: CandidateEffect) -> list[str]:
-        """Paths of a candidate that are fitted with it: ties and further terms stay out."""
+        """Paths of a candidate that scale with it: ties, further terms, presliding stay out."""
         law = CATALOGUE[candidate.effect]
         apart = {stem for tie in law.ties for stem in tie[1:]} | {
             stem for term in law.terms for stem in term
         }
+        apart.add("presliding")
         return [
             path for path in candidate.fitted_paths if slot(path).partition(".")[2] not in apart
         ]
@@ -523,7 +537,7 @@ class EffectSelection:
                     _quantity(path).to_si(float(v)) for v in (0.0, far, low, high)
                 )
                 more.append(Coordinate(slot(path), abs(size - zero) or 1.0, False, least, most))
-        more += [_presliding(candidate.effect)] if "presliding" in law.scanned else []
+        more += [_presliding(candidate.effect)] if "presliding" in law.quantities else []
         here = move.start or now.fit.point
         whole = replace(here, numbers={**box.numbers(), **here.numbers})
         best = None
@@ -531,10 +545,11 @@ class EffectSelection:
         for part, share, wide in (*starts, *(CAREFUL if careful else ())):
             values = dict(at)
             for c in more:
-                if c.name in absent:
-                    values[c.name] = absent[c.name] + part * (at[c.name] - absent[c.name])
+                if c.logarithmic:
+                    usual = at.get(c.name, whole.numbers[c.name])
+                    values[c.name] = float(np.clip(usual * wide, c.lower, c.upper))
                 else:
-                    values[c.name] = float(np.clip(whole.numbers[c.name] * wide, c.lower, c.upper))
+                    values[c.name] = absent[c.name] + part * (at[c.name] - absent[c.name])
             start = with_values(whole, with_tied(values, tied))
             made = fit(box, self._weaker(start, share), [*now.fit.coordinates, *more], tied)
             best = made if best is None or made.value > best.value else best
@@ -548,7 +563,8 @@ class EffectSelection:
         it.
         """
         most = 3.0 * min(point.forces) if share < 1.0 else max(point.forces)
-        forces = tuple(max(share * min(each, most), 1e-6 * self.force) for each in point.forces)
+        least = min(SHARES) * self.force
+        forces = tuple(max(share * min(each, most), least) for each in point.forces)
         noise = tuple(map(min, point.deviations, self.noise))
         return replace(point, forces=forces, deviations=noise)
 
@@ -656,7 +672,8 @@ class EffectSelection:
         tied = {slot_: of for slot_, of in now.fit.tied.items() if slot_ not in names}
         more, values = [], {}
         for path in candidate.paths:
-            if (name := slot(path)) in names and path in candidate.fitted_paths:
+            known = {c.name for c in now.fit.coordinates}
+            if (name := slot(path)) in names and path in candidate.fitted_paths and name not in known:
                 quantity = _quantity(path)
                 low, high = (quantity.to_si(end) for end in (quantity.lower, quantity.upper))
                 follows = now.fit.tied.get(name)
