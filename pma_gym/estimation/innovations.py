@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from pma_gym.codegen.machine.control import Module
 from pma_gym.codegen.machine.native import compiled, simd_lanes
+from pma_gym.data.signals import Signal
 from pma_gym.effects.effect import Effect
 from pma_gym.effects.ports import SENSOR_DELAY
 from pma_gym.effects.slide.coulomb_friction import friction_path
@@ -41,6 +42,9 @@ Where a motion is imposed it is in series with what is measured.
 
 SPEEDS = {"slide": "velocity", "joint": "spin", "imposed": "velocity"}
 """The state that is the speed, by rig."""
+
+ZERO_OF = "zero_of_"
+"""Before a signal's name: the state that is its sensor's zero."""
 
 TREND, TRIAL = "~", "@"
 """Marks of a parameter's further numbers.
@@ -102,6 +106,10 @@ def equations(model: Model, channels: Sequence[int]) -> FilterEquations:
     known = {state.name: state.value for state in eq.states}
     signals = [model.rig.signals[channel] for channel in channels]
     readings = [known.get(f"lag_{signal.sensor}", eq.outputs[signal.name]) for signal in signals]
+    for i, signal in enumerate(signals):
+        if _has_zero(model, signal):
+            eq.add_state(f"{ZERO_OF}{signal.name}", eq.graph.constant(0.0), None)
+            readings[i] = readings[i] + eq[f"{ZERO_OF}{signal.name}"]
     bristles = [
         n
         for e in model.effects.values()
@@ -109,6 +117,11 @@ def equations(model: Model, channels: Sequence[int]) -> FilterEquations:
         for n in e.memory_names
     ]
     return FilterEquations(eq, f"memory_{LATENT}", readings, bristles)
+
+
+def _has_zero(model: Model, signal: Signal) -> bool:
+    """Whether a sensor's zero is another one in each trial: one of a rig that begins at rest."""
+    return signal.has_free_zero and not model.rig.is_free
 
 
 _kernels: dict[tuple[str, ...], Kernel] = {}
@@ -194,6 +207,8 @@ class Rows:
             np.ascontiguousarray(self.readings[::stride]),
         )
         self.there = self.readings[:, :, 1] > 0
+        known = [self.readings[row, i, 0] for i, row in enumerate(self.there.T)]
+        self.ranges = [(float(y[0]), float(np.ptp(y)) + 1e-12) if len(y) else (0.0, 1.0) for y in known]
         spans = np.diff(self.time)
         self.lengths = np.concatenate([[0.0], spans / steps])
         self._asked = np.stack([logged.motor, logged.regulator])
@@ -401,7 +416,13 @@ class GreyBox:
         """Mean and covariance at a trial's first row."""
         if rest:
             at = {name: (value, 0.0) for name, value in rest.items()}
-            at[f"memory_{LATENT}"] = 0.0, point.forces[number]
+            at[f"memory_{LATENT}"] = 0.0, point.forces[number] * self.model.rig.imposes_motion
+            for i, channel in enumerate(self.channels):
+                signal = self.model.rig.signals[channel]
+                if _has_zero(self.model, signal):
+                    first, span = trial.ranges[i]
+                    usual = rest.get(f"lag_{signal.sensor}", 0.0)
+                    at[f"{ZERO_OF}{signal.name}"] = first - usual, span
             for effect in self.model.effects.values():
                 if effect.rate_independent_law is friction_path:
                     at |= dict.fromkeys(effect.memory_names, (0.0, BRISTLE))

@@ -296,10 +296,12 @@ class EffectSelection:
                 continue
             spread = WIDE * abs(quantity.to_si(prior(self.model, path)) - quantity.to_si(0.0))
             inertial = tuple(name.split(".")) == self.model.rig.inertia
-            scale = 1.0 if inertial else abs(numbers[name]) or spread
             lower, upper = quantity.to_si(quantity.lower), quantity.to_si(quantity.upper)
+            positive = inertial or not self.model.rig.is_free and lower > 0.0
+            scale = abs(numbers[name]) or spread
+            wide = 1.0 if inertial else spread / scale
             coordinates.append(
-                Coordinate(name, scale, inertial, lower, upper, 1.0 if inertial else spread / scale)
+                Coordinate(name, 1.0 if positive else scale, positive, lower, upper, wide)
             )
         for effect in self.model.effects.values():
             coordinates += [_presliding(effect.name)] if "presliding" in effect.quantities else []
@@ -672,8 +674,7 @@ class EffectSelection:
         tied = {slot_: of for slot_, of in now.fit.tied.items() if slot_ not in names}
         more, values = [], {}
         for path in candidate.paths:
-            known = {c.name for c in now.fit.coordinates}
-            if (name := slot(path)) in names and path in candidate.fitted_paths and name not in known:
+            if (name := slot(path)) in names and path in candidate.fitted_paths:
                 quantity = _quantity(path)
                 low, high = (quantity.to_si(end) for end in (quantity.lower, quantity.upper))
                 follows = now.fit.tied.get(name)
@@ -681,11 +682,13 @@ class EffectSelection:
                 more.append(Coordinate(name, abs(values[name]) or 1.0, False, low, high))
         if not more:
             return now
+        # What is free already begins again from other shapes.
+        coordinates = {c.name: c for c in (*more, *now.fit.coordinates)}.values()
         best = now.fit
         for wide in WIDER:
             shaped = {n: v * (1.0 if n in now.fit.tied else wide) for n, v in values.items()}
             start = with_values(point, with_tied(shaped, tied))
-            made = fit(now.box, self._weaker(start, 0.3), [*now.fit.coordinates, *more], tied)
+            made = fit(now.box, self._weaker(start, 0.3), list(coordinates), tied)
             best = made if made.value > best.value else best
         return replace(now, fit=best)
 
