@@ -22,6 +22,7 @@ from pma_gym.discovery.grey_box.thresholds import (
     HORIZON,
     HORIZON_S,
     LEFT,
+    LEFT_HELD,
     LIKE,
     MATERIAL,
     NOISES,
@@ -227,6 +228,9 @@ class Conclusions:
         if not self.last.moves and len(self.path) > 1 and self.is_latent:
             return "unknown"
         if material and (self.left > LEFT or not self.last.moves):
+            return "unknown"
+        held = self.selection.model.rig.imposes_motion
+        if held and self.last.moves and self.is_latent and self.left > LEFT_HELD:
             return "unknown"
         if effects:
             return "effect"

@@ -200,7 +200,8 @@ class EffectSelection:
         self.stride = max(1, int(total / MOST_ROWS))
         seconds = sum(float(each.time[-1] - each.time[0]) for each in logged)
         slowest = seconds / MOST_STEPS
-        if model.rig.imposes_motion:
+        lags = any(s.sensor in model.parameters for s in model.rig.signals)
+        if model.rig.imposes_motion and not lags:
             slowest = max(slowest, 0.5 / following_rate(model.parameters["imposed_motion"]))
         self.substeps = {
             rough: max(h, slowest) for rough, h in ((False, SUBSTEP_S), (True, ROUGH_SUBSTEP_S))
