@@ -141,8 +141,6 @@ class _Work:
         dataset, given = self._input()
         named, words = prepared(dataset.trials, given)
         trials = [each.trial for each in named]
-        given, slower = with_recorded_bandwidth(given, trials)
-        words = (*words, *slower)
         if given.plant in PORTS:
             every = _candidates(given, named) if search else None
             own = free_parameters(given)
@@ -153,7 +151,8 @@ class _Work:
             )
             words = (*(dataset.checked or ()), *words, *said.warnings)
             return replace(said, warnings=words, seconds=dict(self.seconds))
-        words = (*(dataset.checked or ()), *words)
+        given, slower = with_recorded_bandwidth(given, trials)
+        words = (*(dataset.checked or ()), *words, *slower)
         journal = Journal(self.folder, trials, given, f"diagnosis 7 seed {self.seed}")
         logged = [Logged.of(given, i, trial) for i, trial in enumerate(trials)]
         floors = self._timed("noise", lambda: initial_floors(given, logged, named, dataset.sensors))

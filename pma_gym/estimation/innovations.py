@@ -11,21 +11,12 @@ from numpy.typing import NDArray
 
 from pma_gym.codegen.machine.control import Module
 from pma_gym.codegen.machine.native import compiled, simd_lanes
-from pma_gym.data.signals import Signal
 from pma_gym.effects.effect import Effect
 from pma_gym.effects.ports import SENSOR_DELAY
 from pma_gym.effects.slide.coulomb_friction import friction_path
 from pma_gym.estimation.logged import Logged
-from pma_gym.integrator.filter_kernel import (
-    FilterEquations,
-    parameter_slots,
-    used_commands,
-    write_filter,
-)
-from pma_gym.integrator.equations import ZERO
-from pma_gym.plant.compiled_model import CompiledModel
+from pma_gym.integrator.filter_kernel import FilterEquations, parameter_slots, write_filter
 from pma_gym.plant.composition import PlantEquations
-from pma_gym.plant.equilibrium.solver import equilibria_at
 from pma_gym.plant.model import Model
 from pma_gym.plant.program import parameter_names, structure
 from pma_gym.units import Quantity
@@ -34,17 +25,11 @@ Array = NDArray[np.float64]
 
 LATENT = "latent_force"
 
-PORTS = {"slide": "slide_force", "joint": "joint_torque", "imposed": "contact_force"}
-"""Where the latent force acts, by rig: drive and load act on one mass, so they are one place.
+PORTS = {"slide": "slide_force", "joint": "joint_torque"}
+"""Where the latent force acts, by rig: drive and load act on one mass, so they are one place."""
 
-Where a motion is imposed it is in series with what is measured.
-"""
-
-SPEEDS = {"slide": "velocity", "joint": "spin", "imposed": "velocity"}
+SPEEDS = {"slide": "velocity", "joint": "spin"}
 """The state that is the speed, by rig."""
-
-ZERO_OF = "zero_of_"
-"""Before a signal's name: the state that is its sensor's zero."""
 
 TREND, TRIAL = "~", "@"
 """Marks of a parameter's further numbers.
@@ -78,14 +63,12 @@ class Kernel:
         call: the compiled function, see `filter_kernel.ARGUMENTS`.
         slots: names of the parameters that it takes.
         states: names of its states.
-        commands: which commands it takes.
         width: lanes.
     """
 
     call: Callable
     slots: tuple[str, ...]
     states: tuple[str, ...]
-    commands: tuple[int, ...]
     width: int
 
     @property
@@ -106,10 +89,6 @@ def equations(model: Model, channels: Sequence[int]) -> FilterEquations:
     known = {state.name: state.value for state in eq.states}
     signals = [model.rig.signals[channel] for channel in channels]
     readings = [known.get(f"lag_{signal.sensor}", eq.outputs[signal.name]) for signal in signals]
-    for i, signal in enumerate(signals):
-        if _has_zero(model, signal):
-            eq.add_state(f"{ZERO_OF}{signal.name}", eq.graph.constant(0.0), None)
-            readings[i] = readings[i] + eq[f"{ZERO_OF}{signal.name}"]
     bristles = [
         n
         for e in model.effects.values()
@@ -117,11 +96,6 @@ def equations(model: Model, channels: Sequence[int]) -> FilterEquations:
         for n in e.memory_names
     ]
     return FilterEquations(eq, f"memory_{LATENT}", readings, bristles)
-
-
-def _has_zero(model: Model, signal: Signal) -> bool:
-    """Whether a sensor's zero is another one in each trial: one of a rig that begins at rest."""
-    return signal.has_free_zero and not model.rig.is_free
 
 
 _kernels: dict[tuple[str, ...], Kernel] = {}
@@ -145,8 +119,7 @@ def kernel(model: Model, channels: Sequence[int], keeps: bool = False) -> Kernel
         library = compiled(key, build, f"filter of {model.name}", brief=True)
         call = library.function("innovations", [ctypes.c_int64] * 2 + [ctypes.c_void_p] * 7)
         states = tuple(state.name for state in made.states)
-        slots, used = parameter_slots(made, keeps), used_commands(made)
-        _kernels[key] = Kernel(call, tuple(slots), states, tuple(used), width)
+        _kernels[key] = Kernel(call, tuple(parameter_slots(made, keeps)), states, width)
     return _kernels[key]
 
 
@@ -207,44 +180,42 @@ class Rows:
             np.ascontiguousarray(self.readings[::stride]),
         )
         self.there = self.readings[:, :, 1] > 0
-        known = [self.readings[row, i, 0] for i, row in enumerate(self.there.T)]
-        self.ranges = [(float(y[0]), float(np.ptp(y)) + 1e-12) if len(y) else (0.0, 1.0) for y in known]
         spans = np.diff(self.time)
         self.lengths = np.concatenate([[0.0], spans / steps])
-        self._asked = np.stack([logged.motor, logged.regulator])
-        self._at = np.asarray(logged.time, float)
+        self._motor, self._at = np.asarray(logged.motor, float), np.asarray(logged.time, float)
         between = np.diff(self._at)
-        rise = np.diff(self._asked) / between if linear else np.zeros((2, len(between)))
-        self._slopes = np.pad(rise, ((0, 0), (0, 1)))
-        held = self._asked[:, :-1] * between + 0.5 * rise * between**2
-        self._sums = np.pad(np.cumsum(held, axis=1), ((0, 0), (1, 0)))
+        rise = np.diff(self._motor) / between if linear else np.zeros(len(between))
+        self._slopes = np.append(rise, 0.0)
+        held = self._motor[:-1] * between + 0.5 * rise * between**2
+        self._sums = np.concatenate([[0.0], np.cumsum(held)])
         edges = self.time[:-1, None] + spans[:, None] * (np.arange(steps + 1) / steps)
         self._from, self._to = edges[:, :-1], edges[:, 1:]
         self._known: dict[float, Array] = {}
         self._starts: dict[tuple[int | None, int | None], tuple[float, float, float]] = {}
 
     @property
-    def first(self) -> Array:
-        """Commands in the first row."""
-        return self._asked[:, 0]
+    def first(self) -> float:
+        """Command in the first row."""
+        return float(self._motor[0])
 
     def commands(self, delay: float) -> Array:
-        """Mean commands over each step, late by a delay; shape (commands, rows, steps)."""
+        """Mean command over each step, late by a delay; shape (rows, steps)."""
         if delay not in self._known:
             if len(self._known) > MOST_KEPT:
                 self._known.clear()
             first, last = (self._integral(edge - delay) for edge in (self._from, self._to))
             mean = (last - first) / (self._to - self._from)
-            start = np.broadcast_to(self.first[:, None, None], (2, 1, self.steps))
-            self._known[delay] = np.concatenate([start, mean], axis=1)
+            self._known[delay] = np.concatenate([np.full((1, self.steps), self.first), mean])
         return self._known[delay]
 
     def _integral(self, at: Array) -> Array:
-        """Integrals of the commands up to given times; before the first row they are as there."""
+        """Integral of the command up to given times; before the first row it is as there."""
         place = np.interp(at, self._at, np.arange(len(self._at))).astype(int)
         beyond = at - self._at[place]
-        slope = 0.5 * self._slopes[:, place] * np.maximum(beyond, 0.0)
-        return self._sums[:, place] + (self._asked[:, place] + slope) * beyond
+        return (
+            self._sums[place]
+            + (self._motor[place] + 0.5 * self._slopes[place] * np.maximum(beyond, 0.0)) * beyond
+        )
 
     def begin(self, position: int | None, speed: int | None) -> tuple[float, float, float]:
         """First position and speed, with the speed's standard deviation, from the first rows."""
@@ -350,21 +321,9 @@ class GreyBox:
         points: Sequence[Point],
         kept: Array | None = None,
     ) -> Array:
-        commands = np.stack(
-            [np.moveaxis(trial.commands(p.delay)[list(k.commands)], 0, -1) for p in points], axis=-1
-        )
-        rests, zeros = self._rests(trial, points, number)
-        parameters = np.stack(
-            [self._vector(*each, k.slots, number) for each in zip(points, zeros, strict=True)],
-            axis=-1,
-        )
-        start = np.stack(
-            [
-                self._start(trial, *each, number, k.states)
-                for each in zip(points, rests, strict=True)
-            ],
-            axis=-1,
-        )
+        commands = np.stack([trial.commands(point.delay) for point in points], axis=-1)
+        parameters = np.stack([self._vector(point, k.slots, number) for point in points], axis=-1)
+        start = np.stack([self._start(trial, point, number, k.states) for point in points], axis=-1)
         out = np.empty((len(trial.time), len(self.channels), 2, len(points)))
         arrays = [
             np.ascontiguousarray(a)
@@ -374,29 +333,8 @@ class GreyBox:
         k.call(len(trial.time), trial.steps, *addresses, 0 if kept is None else kept.ctypes.data)
         return out
 
-    def _rests(
-        self, trial: Rows, points: Sequence[Point], number: int
-    ) -> tuple[Sequence[dict[str, float]], Sequence[float]]:
-        """States in equilibrium at the first commands, and x0 (m); nothing of a free rig."""
-        if self.model.rig.is_free:
-            return [{}] * len(points), [0.0] * len(points)
-        plant, names = CompiledModel(self.model), parameter_names(self.model)
-        vectors = np.array(
-            [
-                [
-                    plant.tolerance,
-                    *(value_in_trial(p, name, number, self.order) for name in names),
-                ]
-                for p in points
-            ]
-        )
-        motor, regulator = np.repeat(trial.first[:, None], len(points), axis=1)
-        states, zeros = equilibria_at(plant, motor, regulator, vectors)
-        return [dict(zip(plant.states, row, strict=True)) for row in states.tolist()], zeros.tolist()
-
-    def _vector(self, point: Point, zero: float, slots: Sequence[str], number: int) -> Array:
+    def _vector(self, point: Point, slots: Sequence[str], number: int) -> Array:
         own = {
-            ZERO: zero,
             f"{LATENT}.memory_time": point.memory,
             "process_noise": 2.0 * point.forces[number] ** 2 / point.memory,
         }
@@ -405,32 +343,8 @@ class GreyBox:
             [own[s] if s in own else value_in_trial(point, s, number, self.order) for s in slots]
         )
 
-    def _start(
-        self,
-        trial: Rows,
-        point: Point,
-        rest: Mapping[str, float],
-        number: int,
-        states: Sequence[str],
-    ) -> Array:
+    def _start(self, trial: Rows, point: Point, number: int, states: Sequence[str]) -> Array:
         """Mean and covariance at a trial's first row."""
-        if rest:
-            at = {name: (value, 0.0) for name, value in rest.items()}
-            at[f"memory_{LATENT}"] = 0.0, point.forces[number] * self.model.rig.imposes_motion
-            for i, channel in enumerate(self.channels):
-                signal = self.model.rig.signals[channel]
-                if _has_zero(self.model, signal):
-                    first, span = trial.ranges[i]
-                    usual = rest.get(f"lag_{signal.sensor}", 0.0)
-                    at[f"{ZERO_OF}{signal.name}"] = first - usual, span
-            for effect in self.model.effects.values():
-                if effect.rate_independent_law is friction_path:
-                    at |= dict.fromkeys(effect.memory_names, (0.0, BRISTLE))
-            return _flat(at, states)
-        return _flat(self._moving(trial, point, number), states)
-
-    def _moving(self, trial: Rows, point: Point, number: int) -> dict[str, tuple[float, float]]:
-        """Means and deviations at the first row of a free rig."""
         signals, plant = self.model.rig.signals, self.model.plant
         position, speed = (signal.name for signal in signals[:2])
         where = {signals[channel].name: i for i, channel in enumerate(self.channels)}
@@ -451,7 +365,7 @@ class GreyBox:
             f"lag_{signals[0].sensor}": (first, level),
             f"lag_{signals[1].sensor}": (motion, spread),
         }
-        asked = self.asked(float(trial.first[0])), 0.0
+        asked = self.asked(trial.first), 0.0
         into = {
             "drive_delay": asked,
             "drive_lag": asked,
@@ -465,7 +379,11 @@ class GreyBox:
                 odd = way if effect.port == f"{SENSOR_DELAY}{position}" else 0.0
                 bristle = 0.0, BRISTLE if effect.rate_independent_law else odd
                 at[name] = into[effect.port] if passed else bristle
-        return at
+        pairs = [at.get(name, (0.0, 0.0)) for name in states]
+        covariance = np.diag([deviation**2 for _, deviation in pairs])
+        return np.concatenate(
+            [[mean for mean, _ in pairs], covariance[np.tril_indices(len(states))]]
+        )
 
     def asked(self, command: float) -> float:
         """What the drive asks for at a command (N; else the command itself)."""
@@ -473,13 +391,6 @@ class GreyBox:
         if drive is None or drive.law is None:
             return command
         return float(drive.law(command, self.model.parameters[drive.name]))
-
-
-def _flat(at: Mapping[str, tuple[float, float]], states: Sequence[str]) -> Array:
-    """Means, and the lower half of the covariance, of independent states; others are 0 for sure."""
-    pairs = [at.get(name, (0.0, 0.0)) for name in states]
-    covariance = np.diag([deviation**2 for _, deviation in pairs])
-    return np.concatenate([[mean for mean, _ in pairs], covariance[np.tril_indices(len(states))]])
 
 
 BRISTLE = 3.0**-0.5

@@ -37,7 +37,7 @@ from pma_gym.codegen.machine.control import (
 from pma_gym.codegen.machine.simd import SimdEmitter
 from pma_gym.codegen.trace import live_inputs, split, substitute, trace
 from pma_gym.effects.arithmetic import clip
-from pma_gym.integrator.equations import COMMANDS, ZERO, Equations
+from pma_gym.integrator.equations import COMMANDS, Equations
 from pma_gym.integrator.exponential_rosenbrock import solver
 from pma_gym.integrator.integration import memory
 from pma_gym.integrator.step_attempt import _signs, step_start
@@ -272,8 +272,8 @@ def _minus(a: Entry) -> Entry:
 ARGUMENTS = ("times", "commands", "readings", "parameters", "start", "out", "kept")
 """Addresses that the function takes, after the numbers of rows and of steps a row.
 
-times: length of a step before each row, (rows,); commands: [row, step, command, lane], those of
-    `used_commands`; readings: [row, sensor, (reading, counts)]; parameters: [slot, lane]; start: [state and covariance, lane]; out:
+times: length of a step before each row, (rows,); commands: [row, step, lane]; readings: [row,
+    sensor, (reading, counts)]; parameters: [slot, lane]; start: [state and covariance, lane]; out:
     [row, sensor, (reading less what was expected, variance), lane]; kept: per row the predicted
     mean and covariance, the corrected ones and the transition from the row before, one lane.
 """
@@ -287,13 +287,7 @@ def _everything(made: FilterEquations, keeps: bool) -> list[Value]:
 
 
 def _fixed_inputs(values: Sequence[Value]) -> list[Value]:
-    return [value for value in live_inputs(values) if value.level == FIXED or value.data == ZERO]
-
-
-def used_commands(made: FilterEquations) -> list[int]:
-    """Which commands the rig's equations depend on."""
-    names = {value.data for value in live_inputs(_everything(made, False))}
-    return [i for i, name in enumerate(COMMANDS) if name in names]
+    return [value for value in live_inputs(values) if value.level == FIXED]
 
 
 def parameter_slots(made: FilterEquations, keeps: bool) -> list[str]:
@@ -319,12 +313,12 @@ def write_filter(module: Module, made: FilterEquations, width: int, keeps: bool)
     size = n + len(made.covariance)
     state = memory(b, ir.ArrayType(simd.real, size))
     cells = [*made.mean, *made.covariance.values()]
-    used = used_commands(made)
     held = {
         value.id: simd.constant(0.0)
         for value in live_inputs(everything)
-        if value.level == HELD and value.data not in (*COMMANDS, ZERO)
+        if value.level == HELD and value.data not in COMMANDS
     }
+    held[eq[COMMANDS[1]].id] = simd.constant(0.0)
     phi = memory(b, ir.ArrayType(simd.real, 2 * n * n))
     slot = 2 * size + n * n
 
@@ -346,9 +340,7 @@ def write_filter(module: Module, made: FilterEquations, width: int, keeps: bool)
         with loop(b, moves) as s:
             known = load()
             known[made.length.id] = length
-            first = b.mul(b.add(b.mul(row, steps), s), integer(len(used)))
-            for i, which in enumerate(used):
-                known[eq[COMMANDS[which]].id] = simd.load(b, commands, b.add(first, integer(i)))
+            known[eq[COMMANDS[0]].id] = simd.load(b, commands, b.add(b.mul(row, steps), s))
             emitted = simd.emit(b, [*made.step, *transition], known)
             for i, value in enumerate(made.step):
                 simd.store(b, emitted[value.id], state, i)

@@ -22,7 +22,6 @@ from pma_gym.discovery.grey_box.thresholds import (
     HORIZON,
     HORIZON_S,
     LEFT,
-    LEFT_HELD,
     LIKE,
     MATERIAL,
     NOISES,
@@ -73,8 +72,6 @@ class Conclusions:
         """The hypothesis that is proposed, without a delay that is not worth its price."""
         chosen = self._chosen
         prompt = [c for c in chosen.fit.coordinates if c.name != "delay"]
-        if len(prompt) == len(chosen.fit.coordinates):
-            return chosen
         made = fit(chosen.box, replace(chosen.fit.point, delay=0.0), prompt, chosen.fit.tied)
         least = chosen.fit.value - self.selection.price_of(chosen, 1) - LIKE
         return replace(chosen, fit=made) if made.value > least else chosen
@@ -228,9 +225,6 @@ class Conclusions:
         if not self.last.moves and len(self.path) > 1 and self.is_latent:
             return "unknown"
         if material and (self.left > LEFT or not self.last.moves):
-            return "unknown"
-        held = self.selection.model.rig.imposes_motion
-        if held and self.last.moves and self.is_latent and self.left > LEFT_HELD:
             return "unknown"
         if effects:
             return "effect"
@@ -455,10 +449,12 @@ class Conclusions:
     def states(self) -> dict[str, TrialState]:
         """What belongs to each trial: its start, and its own values."""
         out = {}
-        paths = self.selection.model.rig.start_paths.values()
+        position, speed = self.selection.model.rig.start_paths.items()
         for i, (each, smooth) in enumerate(zip(self.named, self._ended, strict=True)):
             values = {}
-            for path, value in zip(paths, (smooth.position[0], smooth.speed[0]), strict=False):
+            for (_, path), value in zip(
+                (position, speed), (smooth.position[0], smooth.speed[0]), strict=True
+            ):
                 values[path] = float(value) / SI_FACTORS[_unit(path)]
             for move in self.last.moves:
                 for name in move.slots:

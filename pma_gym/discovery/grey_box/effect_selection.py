@@ -10,7 +10,6 @@ from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
 from pma_gym.discovery.fitting.free_parameters import free_parameters, prior
 from pma_gym.discovery.grey_box.thresholds import FAINT, LIKE, LINE, LOUD, MOST_EFFECTS, ODD, TRIED
 from pma_gym.effects import CATALOGUE
-from pma_gym.effects.contact.imposed_motion import following_rate
 from pma_gym.effects.effect import signals
 from pma_gym.estimation.innovations import (
     TREND,
@@ -174,18 +173,13 @@ class EffectSelection:
         tell: Callable[[str, int, int], None] = lambda step, done, total: None,
     ) -> None:
         self.model, self.logged, self.seed, self.tell = model, list(logged), seed, tell
-        # An imposed motion is a record, and a line between its rows; it is no reading besides.
-        self.linear = model.rig.imposes_motion or linear
+        self.linear = linear
         self.channels = [
-            i
-            for i, signal in enumerate(model.rig.signals)
-            if any(each.measures[i] for each in logged)
-            and not (model.rig.imposes_motion and signal.is_position)
+            i for i in range(len(model.rig.signals)) if any(each.measures[i] for each in logged)
         ]
         # The delay between command and readings is free in every fit; a lag of the only sensor
         # is no other thing.
         late = DELAYS[:1] if len(self.channels) > 1 else (*DELAYS, *LAGS)
-        late = late if model.rig.is_free else ()
         self.candidates = [each for each in candidates if each.name not in late]
         readings = [
             [each.measured[c][each.counts[c] > 0] for each in logged] for c in self.channels
@@ -199,12 +193,9 @@ class EffectSelection:
         total = sum(len(each.time) for each in logged) / self.block
         self.stride = max(1, int(total / MOST_ROWS))
         seconds = sum(float(each.time[-1] - each.time[0]) for each in logged)
-        slowest = seconds / MOST_STEPS
-        lags = any(s.sensor in model.parameters for s in model.rig.signals)
-        if model.rig.imposes_motion and not lags:
-            slowest = max(slowest, 0.5 / following_rate(model.parameters["imposed_motion"]))
         self.substeps = {
-            rough: max(h, slowest) for rough, h in ((False, SUBSTEP_S), (True, ROUGH_SUBSTEP_S))
+            rough: max(h, seconds / MOST_STEPS)
+            for rough, h in ((False, SUBSTEP_S), (True, ROUGH_SUBSTEP_S))
         }
         self.span = (
             self.stride
@@ -217,7 +208,6 @@ class EffectSelection:
         self.noise = [n / self.block**0.5 for n in self.noise]
         self._rows: dict[tuple[int, bool], list[Rows]] = {}
         self.force = self._force()
-        self.pressed = any(each.regulator.any() for each in logged)
 
     def _block(self, readings: Sequence[Sequence[Array]]) -> int:
         total, block = sum(len(each.time) for each in self.logged), 1
@@ -246,13 +236,7 @@ class EffectSelection:
         return GreyBox(model, self._rows[steps, linear], self.channels)
 
     def _force(self) -> float:
-        """Force of the drive (N, N m) at the root mean square of its command.
-
-        Where no drive moves the rig freely it is the change of the force that is measured.
-        """
-        if not self.model.rig.drive_port:
-            (channel,) = (i for i, each in enumerate(self.model.rig.signals) if each.is_force)
-            return float(np.std(np.concatenate([each.measured[channel] for each in self.logged])))
+        """Force of the drive (N, N m) at the root mean square of its command."""
         motor = np.concatenate([each.motor for each in self.logged])
         middle = float(np.median(motor))
         level = float(np.sqrt(np.mean((motor - middle) ** 2))) or 1.0
@@ -286,10 +270,7 @@ class EffectSelection:
             name, quantity = slot(path), _quantity(path)
             effect, _, stem = name.partition(".")
             law = self.model.effects[effect]
-            pressed = quantity.unit.endswith("/kPa")
-            if path in self.model.rig.start_paths.values() or pressed and not self.pressed:
-                continue
-            if stem == "presliding":
+            if path in self.model.rig.start_paths.values() or quantity.unit.endswith("/kPa"):
                 continue
             tie = next((t for t in law.ties if stem in t[1:]), None)
             if tie and numbers[f"{effect}.{tie[0]}"] == numbers[f"{effect}.{tie[1]}"]:
@@ -297,15 +278,13 @@ class EffectSelection:
                 continue
             spread = WIDE * abs(quantity.to_si(prior(self.model, path)) - quantity.to_si(0.0))
             inertial = tuple(name.split(".")) == self.model.rig.inertia
+            scale = 1.0 if inertial else abs(numbers[name]) or spread
             lower, upper = quantity.to_si(quantity.lower), quantity.to_si(quantity.upper)
-            positive = inertial or not self.model.rig.is_free and lower > 0.0
-            scale = abs(numbers[name]) or spread
-            wide = 1.0 if inertial else spread / scale
             coordinates.append(
-                Coordinate(name, 1.0 if positive else scale, positive, lower, upper, wide)
+                Coordinate(name, scale, inertial, lower, upper, 1.0 if inertial else spread / scale)
             )
         for effect in self.model.effects.values():
-            coordinates += [_presliding(effect.name)] if "presliding" in effect.quantities else []
+            coordinates += [_presliding(effect.name)] if "presliding" in effect.scanned else []
         return coordinates, tied
 
     def nuisances(self) -> list[Coordinate]:
@@ -322,7 +301,7 @@ class EffectSelection:
         least, most = self.memory
         memory = Coordinate("memory", 1.0, True, 0.75 * least, most)
         late = any(effect.port == "drive_delay" for effect in self.model.effects.values())
-        delay = [] if late or not self.model.rig.is_free else [Coordinate("delay", self.span, False, 0.0, MOST_DELAY * self.span)]
+        delay = [] if late else [Coordinate("delay", self.span, False, 0.0, MOST_DELAY * self.span)]
         return [*noise, *forces, memory, *delay]
 
     def base(self) -> Hypothesis:
@@ -503,12 +482,11 @@ class EffectSelection:
         return moves
 
     def _added(self, candidate: CandidateEffect) -> list[str]:
-        """Paths of a candidate that scale with it: ties, further terms, presliding stay out."""
+        """Paths of a candidate that are fitted with it: ties and further terms stay out."""
         law = CATALOGUE[candidate.effect]
         apart = {stem for tie in law.ties for stem in tie[1:]} | {
             stem for term in law.terms for stem in term
         }
-        apart.add("presliding")
         return [
             path for path in candidate.fitted_paths if slot(path).partition(".")[2] not in apart
         ]
@@ -540,7 +518,7 @@ class EffectSelection:
                     _quantity(path).to_si(float(v)) for v in (0.0, far, low, high)
                 )
                 more.append(Coordinate(slot(path), abs(size - zero) or 1.0, False, least, most))
-        more += [_presliding(candidate.effect)] if "presliding" in law.quantities else []
+        more += [_presliding(candidate.effect)] if "presliding" in law.scanned else []
         here = move.start or now.fit.point
         whole = replace(here, numbers={**box.numbers(), **here.numbers})
         best = None
@@ -548,11 +526,10 @@ class EffectSelection:
         for part, share, wide in (*starts, *(CAREFUL if careful else ())):
             values = dict(at)
             for c in more:
-                if c.logarithmic:
-                    usual = at.get(c.name, whole.numbers[c.name])
-                    values[c.name] = float(np.clip(usual * wide, c.lower, c.upper))
-                else:
+                if c.name in absent:
                     values[c.name] = absent[c.name] + part * (at[c.name] - absent[c.name])
+                else:
+                    values[c.name] = float(np.clip(whole.numbers[c.name] * wide, c.lower, c.upper))
             start = with_values(whole, with_tied(values, tied))
             made = fit(box, self._weaker(start, share), [*now.fit.coordinates, *more], tied)
             best = made if best is None or made.value > best.value else best
@@ -684,7 +661,7 @@ class EffectSelection:
         if not more:
             return now
         # What is free already begins again from other shapes.
-        coordinates = {c.name: c for c in (*more, *now.fit.coordinates)}.values()
+        coordinates = {c.name: c for c in (*now.fit.coordinates, *more)}.values()
         best = now.fit
         for wide in WIDER:
             shaped = {n: v * (1.0 if n in now.fit.tied else wide) for n, v in values.items()}

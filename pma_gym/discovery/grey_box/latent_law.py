@@ -8,16 +8,11 @@ from pma_gym.data.trial_columns import BY_QUANTITY
 from pma_gym.discovery.grey_box.thresholds import CONFIDENCE
 from pma_gym.discovery.report.figure_text import percent, signal_name
 from pma_gym.discovery.result.misfit import ResidualLaw
-from pma_gym.estimation.innovations import SPEEDS
 from pma_gym.estimation.smoother import Smoothed
 from pma_gym.plant.rigs.rig import Rig
 from pma_gym.units import SI_FACTORS
 
-FORCES = {
-    "slide": ("force on the slide", "N"),
-    "joint": ("torque on the joint", "N m"),
-    "imposed": ("force on what moves", "N"),
-}
+FORCES = {"slide": ("force on the slide", "N"), "joint": ("torque on the joint", "N m")}
 """What a latent force is, and its unit, by rig."""
 
 BINS, LEAST_BINS = 12, 3
@@ -35,9 +30,7 @@ def latent_law(trials: Sequence[Smoothed], rig: Rig, rows: float) -> ResidualLaw
         Means with 95 % bands; None where neither position nor speed varies.
     """
     force = np.concatenate([each.force for each in trials])
-    speeds = [each.name for each in rig.signals if "speed" in each.measures]
-    names = rig.signals[0].name, *speeds, SPEEDS[rig.name]
-    columns = [BY_QUANTITY[name] for name in names[:2]]
+    columns = [BY_QUANTITY[signal.name] for signal in rig.signals[:2]]
     values = [[each.position for each in trials], [each.speed for each in trials]]
     best = None
     for column, parts in zip(columns, values, strict=True):

@@ -22,12 +22,6 @@ LEFT = 0.5
 They carry at least half.
 """
 
-LEFT_HELD = 0.35
-"""The same where the motion is imposed, however small the latent force: it is all that is read.
-
-On twelve development cases what the catalogue has left up to 0.12, what it has not from 0.42 on.
-"""
-
 MOST_EFFECTS = 3
 """Effects at most: a beam of more was never right on data whose effects are known (design)."""
 
