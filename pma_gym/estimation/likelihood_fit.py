@@ -182,7 +182,8 @@ def fit(
         for factor in FACTORS:
             ridge = (damping * factor + 1e-10) * np.eye(p) + np.diag(out.astype(float))
             step = np.linalg.solve(normal + ridge, np.where(out, 0.0, gradient) / scale) / scale
-            steps.append(within(x + step * min(1.0, WIDEST / max(np.abs(step).max(), 1e-12))))
+            # Each by itself: what the readings tell nothing of must not hold the others back.
+            steps.append(within(x + np.clip(step, -WIDEST, WIDEST)))
         values, _ = valued(steps)
         at = int(np.argmax(values))
         gain = float(values[at]) - best

@@ -211,20 +211,20 @@ class FilterEquations:
         """Mean and covariance after the readings, then each reading's innovation and variance."""
         eq, n = self.eq, len(self.mean)
         zero = eq.graph.constant(0.0)
-        here = {m.after.id: m.value for m in eq.rate_independent_states}
         mean = list(self.mean)
         p = {(i, j): self.p(i, j) for i in range(n) for j in range(n)}
         shown: list[Value] = []
-        rows = derivatives(list(self.readings), self.mean)
-        for value, row, reading, counts, variance in zip(
-            self.readings, rows, self.read, self.counts, self.variances, strict=True
+        readings = substitute(
+            list(self.readings), {m.after.id: m.value for m in eq.rate_independent_states}
+        )
+        rows = derivatives(readings, self.mean)
+        for expected, slopes, reading, counts, variance in zip(
+            readings, rows, self.read, self.counts, self.variances, strict=True
         ):
-            (expected,) = substitute([value], here)
             # Linear in the change of the mean that former readings of the same row have made.
-            for slope, new, old in zip(row, mean, self.mean, strict=True):
+            for slope, new, old in zip(slopes, mean, self.mean, strict=True):
                 if slope is not None and new is not old:
-                    expected = expected + substitute([slope], here)[0] * (new - old)
-            slopes = [None if s is None else substitute([s], here)[0] for s in row]
+                    expected = expected + slope * (new - old)
             along: list[Entry] = []
             for i in range(n):
                 total: Entry = None

@@ -490,13 +490,8 @@ class EffectSelection:
         )
         moves = []
         for c, slope in zip(mean, slopes, strict=True):
-            if (
-                c.logarithmic
-                and c.name.endswith("presliding")
-                or c.name in ("delay",)
-                or TREND in c.name
-                or TRIAL in c.name
-            ):
+            alone = TREND in c.name or TRIAL in c.name
+            if alone or c.name == "delay" or c.name.endswith("presliding"):
                 continue
             columns = {f"{c.name}{TREND}": slope * now.box.order[of]}
             columns |= {f"{c.name}{TRIAL}{i}": slope * (of == i) for i in range(count)}
@@ -603,7 +598,8 @@ class EffectSelection:
         it.
         """
         most = 3.0 * min(point.forces) if share < 1.0 else max(point.forces)
-        forces = tuple(max(share * min(each, most), 1e-6 * self.force) for each in point.forces)
+        least = min(SHARES) * self.force
+        forces = tuple(max(share * min(each, most), least) for each in point.forces)
         noise = tuple(map(min, point.deviations, self.noise))
         return replace(point, forces=forces, deviations=noise)
 
@@ -719,11 +715,13 @@ class EffectSelection:
                 more.append(Coordinate(name, abs(values[name]) or 1.0, False, low, high))
         if not more:
             return now
+        # What is free already begins again from other shapes.
+        coordinates = {c.name: c for c in (*now.fit.coordinates, *more)}.values()
         best = now.fit
         for wide in WIDER:
             shaped = {n: v * (1.0 if n in now.fit.tied else wide) for n, v in values.items()}
             start = with_values(point, with_tied(shaped, tied))
-            made = fit(now.box, self._weaker(start, 0.3), [*now.fit.coordinates, *more], tied)
+            made = fit(now.box, self._weaker(start, 0.3), list(coordinates), tied)
             best = made if made.value > best.value else best
         return replace(now, fit=best)
 
