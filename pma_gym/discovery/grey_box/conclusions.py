@@ -18,6 +18,7 @@ from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
 from pma_gym.discovery.grey_box.effect_selection import EffectSelection, Hypothesis, Move, slot
 from pma_gym.discovery.grey_box.latent_law import latent_law
 from pma_gym.discovery.grey_box.thresholds import (
+    COMPLETE,
     CONFIDENCE,
     FAR,
     HORIZON,
@@ -232,16 +233,16 @@ class Conclusions:
         material = self.share(self.last) > MATERIAL and self.is_latent
         if not self.last.moves and len(self.path) > 1 and self.is_latent:
             return "unknown"
-        missed = self.misfit(self.last) > NOISES and self.is_latent
+        incomplete = material or self.is_latent and self.misfit(self.last) > COMPLETE
         if material and not self.last.moves:
             return "unknown"
-        if self.last.moves and self.left > LEFT and (material or missed):
+        if self.last.moves and self.left > LEFT and incomplete:
             return "unknown"
         if self.far:
             return "undecidable"
         if effects:
             return "effect"
-        if not self.last.moves and missed:
+        if not self.last.moves and self.misfit(self.last) > NOISES and self.is_latent:
             return "undecidable"
         if self._within_tolerance() or not self.last.moves and not self._moved:
             return "agrees"

@@ -72,3 +72,6 @@ Assumption: a data sheet or a scale is off by less, so that beyond it the fit be
 
 SMALL = 0.01
 """Share of the first misfit (mean square) that an addition carries where much is left after it."""
+
+COMPLETE = 1.5
+"""Noises that predictions of a complete model miss by at most, as for stations."""
