@@ -203,8 +203,9 @@ class Conclusions:
             return 0.0
         late, error = last.fit.point.delay, last.fit.deviations["delay"]
         row = self.selection.span / self.selection.stride / self.selection.block
-        # A line half a row late is a held command in time.
-        prompt = (0.0, 0.5 * row) if self.selection.linear else (0.0,)
+        # A line half a row late is a held command in time: an incomplete model tells them not apart.
+        alike = self.selection.linear and self.misfit(last) > COMPLETE
+        prompt = (0.0, 0.5 * row) if alike else (0.0,)
         if min(abs(late - each) for each in prompt) < max(ROWS_LATE * row, CONFIDENCE * error):
             return 0.0
         price = np.log(len(self.candidates)) + self.selection.price_of(last, 1)
