@@ -203,7 +203,7 @@ class Conclusions:
             return 0.0
         late, error = last.fit.point.delay, last.fit.deviations["delay"]
         row = self.selection.span / self.selection.stride / self.selection.block
-        # A line half a row late is a held command in time: an incomplete model tells them not apart.
+        # In an incomplete model, a line half a row late is no other than a held command in time.
         alike = self.selection.linear and self.misfit(last) > COMPLETE
         prompt = (0.0, 0.5 * row) if alike else (0.0,)
         if min(abs(late - each) for each in prompt) < max(ROWS_LATE * row, CONFIDENCE * error):
