@@ -143,9 +143,7 @@ def _quick() -> Iterator[None]:
     """No collection of garbage, and an error by the alarm."""
 
     def late(number: int, frame: Any) -> None:  # noqa: ANN401
-        raise RigError(
-            "no command in time for the watchdog: the controller or the line is too slow"
-        )
+        raise RigError("no command in time for the watchdog: the controller or the rig is slow")
 
     handler = signal.signal(signal.SIGALRM, late)
     gc.collect()

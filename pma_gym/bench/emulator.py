@@ -10,7 +10,7 @@ import select
 import sys
 import time
 import tty
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 
 import numpy as np
@@ -46,6 +46,7 @@ class Firmware:
         names = [sensors.direct_command(model) or "motor_voltage"]
         names += ["regulator_voltage"] if model.rig.has_muscle else []
         self._plant, self._signals = plant, [SIGNALS[name] for name in names]
+        self._sensed = [each for each in plant.signals if each.sensor in plant.parameters]
         self._generator = np.random.Generator(np.random.Philox(seed))
         self._clock, self._condition = clock, None
         self._begin = self._time = self._command_time = clock()
@@ -59,15 +60,14 @@ class Firmware:
         while self._time < now and self._condition is not None:
             due = self._command_time + self._watchdog
             if not self.is_safe and self._time >= due:
-                self._make_safe(self._time)
+                self._make_safe()
             step = min(now, self._time + round(TICK_S * 1e9))
             step = step if self.is_safe else min(step, due)
             if self.is_safe and self._ramp >= 0:
                 left = max(0.0, 1.0 - (self._time - self._command_time) / max(self._ramp, 1))
                 pairs = zip(self._rest, self._held, strict=True)
                 self.commands = [rest + left * (last - rest) for rest, last in pairs]
-            inputs = [value * SI_FACTORS[signal.unit] for value, signal in self._known()]
-            self._plant.step(self._condition, *inputs, (step - self._time) * 1e-9)
+            self._plant.step(self._condition, *self._inputs(), (step - self._time) * 1e-9)
             self._time = step
         self._time = now
 
@@ -78,34 +78,33 @@ class Firmware:
             kind, *words = decoded(line)
         except RigError:
             return b""
+        requests = {
+            "I": self._identify,
+            "A": self._arm,
+            "R": self._measure,
+            "C": self._command,
+            "S": self._make_safe,
+        }
         try:
-            answer = {"I": self._identify, "A": self._arm, "R": self._measure}.get(kind)
-            if answer:
-                return answer(words)
-            if kind == "S":
-                self._make_safe(self._time)
-                return encoded("S", "ok")
-            if kind == "C":
-                self._command(words)
-                return b""
-            raise RigError("no such request")
+            if kind not in requests:
+                raise RigError(f"requests are {', '.join(requests)}, got {kind}")
+            return requests[kind](words)
         except ValueError as error:
-            return encoded(
-                "E", *str(error).replace("*", "").encode("ascii", "replace").decode()[:150].split()
-            )
+            return encoded("E", str(error)[:150].replace("*", ""))
 
-    def _known(self) -> list:
-        pairs = list(zip(self.commands, self._signals, strict=True))
-        return pairs if len(pairs) == 2 else [*pairs, (0.0, SIGNALS["regulator_voltage"])]
+    def _inputs(self) -> tuple[float, float]:
+        """Commands as the plant takes them (SI), the regulator's or 0."""
+        pairs = zip(self.commands, self._signals, strict=True)
+        motor, regulator, *_ = [*(value * SI_FACTORS[s.unit] for value, s in pairs), 0.0]
+        return motor, regulator
 
-    def _make_safe(self, now: int) -> None:
-        self.is_safe, self._held, self._command_time = True, self.commands, now
+    def _make_safe(self, words: Sequence[str] = ()) -> bytes:
+        self.is_safe, self._held, self._command_time = True, self.commands, self._time
+        return encoded("S", "ok")
 
     def _identify(self, words: list[str]) -> bytes:
-        columns = [signal.column for signal in self._plant.signals]
-        return encoded(
-            "I", "pma-rig 1", ",".join(s.column for s in self._signals), ",".join(columns)
-        )
+        columns = (",".join(each.column for each in its) for its in (self._signals, self._sensed))
+        return encoded("I", "pma-rig", 1, *columns)
 
     def _arm(self, words: list[str]) -> bytes:
         watchdog, ramp, *rest = numbers(words, 2 + len(self.commands))
@@ -114,10 +113,10 @@ class Firmware:
         self._check(rest)
         if self._condition is None:
             self.commands = rest
-            inputs = [value * SI_FACTORS[signal.unit] for value, signal in self._known()]
-            self._condition = self._plant.settle(inputs[0], regulator_voltage=inputs[1])
+            motor, regulator = self._inputs()
+            self._condition = self._plant.settle(motor, regulator_voltage=regulator)
             # The first step loads compiled code, which takes longer than a watchdog waits.
-            self._plant.step(copy.deepcopy(self._condition), *inputs, TICK_S)
+            self._plant.step(copy.deepcopy(self._condition), motor, regulator, TICK_S)
             self._time = self._clock()
         self._rest, self._watchdog, self._ramp = rest, round(watchdog * 1e6), round(ramp * 1e6)
         self.is_safe, self._command_time = False, self._time
@@ -129,16 +128,17 @@ class Firmware:
         plant, states = self._plant, self._condition.state[None]
         lagged = plant.lagged(states, plant.observe(states, self._condition.zero_contraction))
         measured = sensors.measure(plant.model, lagged, self._generator)
-        values = [float(measured[s.name][0]) / SI_FACTORS[s.unit] for s in plant.signals]
+        values = [float(measured[s.name][0]) / SI_FACTORS[s.unit] for s in self._sensed]
         times = [(each - self._begin) // 1000 for each in (self._time, self._command_time)]
         number = round(numbers(words, 1)[0])
         return encoded("M", number, times[0], int(self.is_safe), times[1], *self.commands, *values)
 
-    def _command(self, words: list[str]) -> None:
+    def _command(self, words: list[str]) -> bytes:
         values = numbers(words, len(self.commands))
         self._check(values)
         if not self.is_safe:
             self.commands, self._command_time = values, self._time
+        return b""
 
     def _check(self, values: list[float]) -> None:
         for value, signal in zip(values, self._signals, strict=True):

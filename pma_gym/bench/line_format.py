@@ -20,7 +20,8 @@ def encoded(*words: object) -> bytes:
     b'R 7*9F4E\\n'
     """
     text = " ".join(f"{word:.9g}" if isinstance(word, float) else str(word) for word in words)
-    return b"%s*%04X\n" % (text.encode("ascii"), binascii.crc_hqx(text.encode("ascii"), 0xFFFF))
+    content = text.encode("ascii", "replace")
+    return b"%s*%04X\n" % (content, binascii.crc_hqx(content, 0xFFFF))
 
 
 def decoded(line: bytes) -> list[str]:
@@ -64,7 +65,7 @@ class LineBuffer:
         self._rest = b""
 
     def lines(self, received: bytes) -> list[bytes]:
-        """Lines that are complete now, without their ends; the beginning of one that is too long."""
+        """Lines that are complete now, without their ends, cut where they are too long."""
         *complete, rest = (self._rest + received).split(b"\n")
         self._rest = rest[:LONGEST]
         self.count += len(complete)

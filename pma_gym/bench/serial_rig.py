@@ -100,10 +100,11 @@ class SerialRig:
                 if fits(words):
                     return words
                 if words[0] == "E":
-                    raise RigError(f"{self._file.port}: the rig refuses {request}: {words[1:]}")
-        raise RigError(
-            f"{self._file.port}: no answer to {request[0]} within {1e3 * limit:g} ms{self._last_bad}"
-        )
+                    raise RigError(
+                        f"{self._file.port}: the rig refuses {request[0]}: {' '.join(words[1:])}"
+                    )
+        missing = f"no answer to {request[0]} within {1e3 * limit:g} ms{self._last_bad}"
+        raise RigError(f"{self._file.port}: {missing}")
 
     def _received(self, seconds: float) -> Iterator[list[str]]:
         """Words of the lines that arrive, at the latest after some time."""
