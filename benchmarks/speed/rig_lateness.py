@@ -1,7 +1,8 @@
-"""How late the steps of a rig begin, beside a bare loop in C: `python -m benchmarks.speed.rig_lateness`.
+"""How late the steps of a rig begin, beside a bare loop in C.
 
-An emulated station at 200 Hz under the PID, logged as always, and at the same time a C program that
-does nothing but wait for the same deadlines by clock_nanosleep. Both have the machine's load.
+`python -m benchmarks.speed.rig_lateness 600` runs an emulated station at 200 Hz under the PID,
+logged as always, and at the same time a C program that does nothing but wait for the same deadlines by
+clock_nanosleep. Both have the machine's load.
 """
 
 import json

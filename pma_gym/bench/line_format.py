@@ -14,10 +14,10 @@ _NUMBER = re.compile(r"-?\d{1,18}(?:\.\d{1,18})?(?:e[+-]?\d{1,3})?")
 
 
 def encoded(*words: object) -> bytes:
-    """The line of some words, with its checksum, CRC-16 with polynomial 1021 from FFFF.
+    r"""The line of some words, with its checksum, CRC-16 with polynomial 1021 from FFFF.
 
     >>> encoded("R", 7)
-    b'R 7*9F4E\\n'
+    b'R 7*BC60\\n'
     """
     text = " ".join(f"{word:.9g}" if isinstance(word, float) else str(word) for word in words)
     content = text.encode("ascii", "replace")

@@ -3,11 +3,10 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Any
 
 from pma_gym.bench.rig import RigError
 from pma_gym.data.trial_columns import BY_QUANTITY, suggestion
-from pma_gym.document_shape import check_shape, shape_of
+from pma_gym.document_shape import ANY, check_shape, shape_of
 from pma_gym.documents import read_toml
 
 SAFE = ("vent", "hold", "ramp")
@@ -119,39 +118,37 @@ def read_rig_file(path: Path) -> RigFile:
         ValueError: no TOML, an unknown or missing key, or a value that breaks a rule.
     """
     document = read_toml(path)
-    try:
-        _check_keys(RigFile, document)
-        check_shape(document, shape_of(RigFile))
-        known = {
-            "commands": {k: _made(CommandLimits, t) for k, t in document["commands"].items()},
-            "measurements": {
-                k: _made(MeasurementLimits, t) for k, t in document["measurements"].items()
-            },
-            "safe": _made(SafeState, document["safe"]),
-        }
-        rig = RigFile(**{**document, **known})
-        _check(rig)
-    except ValueError as error:
-        raise RigError(f"{path}: {error}") from None
     models = {
         key: str(path.parent / name)
         for key in ("model", "emulated_model")
-        if (name := document.get(key, "")).endswith(".toml")
+        if str(name := document.get(key)).endswith(".toml")
     }
-    return RigFile(**{**document, **known, **models})
+    try:
+        _check_keys(RigFile, document)
+        for key, kind in (("commands", CommandLimits), ("measurements", MeasurementLimits)):
+            check_shape(document, {key: {ANY: dict}})
+            for table in document[key].values():
+                _check_keys(kind, table)
+        _check_keys(SafeState, document.get("safe"))
+        check_shape(document, shape_of(RigFile))
+        commands = {name: CommandLimits(**t) for name, t in document["commands"].items()}
+        measurements = {
+            name: MeasurementLimits(**t) for name, t in document["measurements"].items()
+        }
+        known = {"commands": commands, "measurements": measurements}
+        rig = RigFile(**{**document, **known, **models, "safe": SafeState(**document["safe"])})
+        _check(rig)
+    except ValueError as error:
+        raise RigError(f"{path}: {error}") from None
+    return rig
 
 
-def _check_keys(kind: type, table: Mapping[str, Any]) -> None:
+def _check_keys(kind: type, table: object) -> None:
     # A key with a slip of the pen must not take a limit away.
     known = [field.name for field in fields(kind)]
-    for key in table:
+    for key in table if isinstance(table, dict) else ():
         if key not in known:
             raise RigError(f"keys are {', '.join(known)}, got {key!r}{suggestion(key, known)}")
-
-
-def _made(kind: Any, table: Mapping[str, Any]) -> Any:  # noqa: ANN401 - a dataclass of the file
-    _check_keys(kind, table)
-    return kind(**table)
 
 
 def _check(rig: RigFile) -> None:
