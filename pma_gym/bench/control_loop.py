@@ -68,6 +68,7 @@ class ControlLoop:
         with _quick():
             try:
                 self._rig.arm()
+                _alarm(1e-3 * self._file.watchdog_ms)
                 for step, sample, command in self._steps(seconds, act):
                     steps.append(step)
                     if log:
@@ -116,8 +117,8 @@ class ControlLoop:
                 raise RigError(f"{name} must lie in {low:g} to {high:g}, step {row} has {value:g}")
             if limits.rate and abs(value - old) > limits.rate * span:
                 raise RigError(
-                    f"{name} must change by at most {limits.rate:g} a second, in step {row} it goes "
-                    f"from {old:g} to {value:g} in {1e3 * span:.3g} ms"
+                    f"{name} must change by at most {limits.rate:g} a second, in step {row} it "
+                    f"goes from {old:g} to {value:g} in {1e3 * span:.3g} ms"
                 )
 
     def _limited(self, asked: Sequence[float], last: Sequence[float]) -> list[float]:
@@ -143,7 +144,7 @@ def _quick() -> Iterator[None]:
     """No collection of garbage, and an error by the alarm."""
 
     def late(number: int, frame: Any) -> None:  # noqa: ANN401
-        raise RigError("no command in time for the watchdog: the controller or the rig is slow")
+        raise RigError("no command in time for the watchdog: controller or rig is too slow")
 
     handler = signal.signal(signal.SIGALRM, late)
     gc.collect()

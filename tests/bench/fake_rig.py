@@ -62,7 +62,7 @@ with open_rig(rig) as line, TrialLog(Path(sys.argv[2]), rig).trial() as write:
     def log(*row):
         write(*row)
         print(flush=True)
-    ControlLoop(line, rig).run(60.0, lambda time, sample: [6.0 if time % 2.0 < 1.0 else 4.0], log)
+    ControlLoop(line, rig).run(60.0, lambda time, sample: [5.1], log)
 """
 
 
