@@ -1,8 +1,8 @@
 """How late the steps of a rig begin, beside a bare loop in C.
 
-`python -m benchmarks.speed.rig_lateness 600` runs an emulated station at 200 Hz under the PID,
-logged as always, and at the same time a C program that does nothing but wait for the same deadlines by
-clock_nanosleep. Both have the machine's load.
+`python -m benchmarks.speed.rig_lateness 600` runs an emulated station at 200 Hz under the PID and
+logs it as always. At the same time a C program only waits for the same deadlines by
+clock_nanosleep. Both have the load of the machine.
 """
 
 import json
@@ -47,7 +47,7 @@ rate_hz = {RATE_HZ}
 watchdog_ms = 1000
 settle_s = 1.0
 [commands]
-motor_voltage_v = {{range = [0, 10], rate = 50, rest = 0}}
+motor_voltage_v = {{range = [0, 10], rate = 50, rest = 0.1}}
 regulator_voltage_v = {{range = [0, 8], rate = 20, rest = 0, start = 5}}
 [measurements]
 contraction_mm = {{range = [-40, 90]}}

@@ -43,7 +43,7 @@ rate_hz = 100
 watchdog_ms = 1000
 settle_s = 1.0
 [commands]
-motor_voltage_v = {range = [0, 10], rate = 50, rest = 0}
+motor_voltage_v = {range = [0, 10], rate = 50, rest = 0.1}
 regulator_voltage_v = {range = [0, 8], rate = 20, rest = 0, start = 5}
 [measurements]
 contraction_mm = {range = [-20, 70]}

@@ -229,7 +229,7 @@ def test_a_controller_drives_a_rig_as_it_drives_a_simulation(controller, tmp_pat
     assert rig.firmware.is_safe
     trial = read_dataset(tmp_path / "log").trials[0].trial
     ideal = TASKS["displacement"].schedule.reference(trial.time)
-    assert float(np.sqrt(np.mean((trial.extension - ideal) ** 2))) < 0.6e-3
+    assert float(np.sqrt(np.mean((trial.extension - ideal) ** 2))) < 0.4e-3
 
 
 class Emulator:
