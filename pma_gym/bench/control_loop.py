@@ -87,7 +87,7 @@ class ControlLoop:
         while number * period < 1e9 * seconds:
             deadline = zero + number * period
             time.sleep(max(0, deadline - clock()) * 1e-9)
-            begun = clock()
+            started = clock()
             sample = rig.read()
             read = clock()
             self._check(sample, before, number)
@@ -99,7 +99,7 @@ class ControlLoop:
             _alarm(1e-3 * self._file.watchdog_ms)
             if number >= 0:
                 delay = sample.command_time - before.time if before else math.nan
-                spans = begun - deadline, read - begun, acted - read, 1e9 * delay
+                spans = started - deadline, read - started, acted - read, 1e9 * delay
                 yield Step(number, *(1e-3 * span for span in spans)), sample, command
             before = sample
             number = max(number + 1, (clock() - zero) // period)
@@ -109,9 +109,8 @@ class ControlLoop:
         if not span > 0.0:
             raise RigError(f"the rig's clock must go on, in step {row} it went {span:g} s")
         olds = before.values if before else sample.values
-        table = zip(self._rig.measurements, sample.values, olds, strict=True)
-        for name, value, old in table:
-            limits = self._file.measurements[name]
+        table = zip(self._file.measurements.items(), sample.values, olds, strict=True)
+        for (name, limits), value, old in table:
             low, high = limits.range
             if not low <= value <= high:
                 raise RigError(f"{name} must lie in {low:g} to {high:g}, step {row} has {value:g}")

@@ -1,6 +1,6 @@
 """What the loop needs of a rig."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple, Protocol
 
 
@@ -25,15 +25,7 @@ class Sample(NamedTuple):
 
 
 class Rig(Protocol):
-    """A rig: arm, measure, command, make safe.
-
-    Attributes:
-        commands: columns of its commands, such as `motor_voltage_v`.
-        measurements: columns of what it measures, such as `contraction_mm`.
-    """
-
-    commands: Mapping[str, object]
-    measurements: Mapping[str, object]
+    """A rig: arm, measure, command, make safe."""
 
     def arm(self) -> None:
         """Leave the safe state; commands stay as they are until the first one.

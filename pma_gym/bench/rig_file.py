@@ -121,7 +121,7 @@ def read_rig_file(path: Path) -> RigFile:
     models = {
         key: str(path.parent / name)
         for key in ("model", "emulated_model")
-        if str(name := document.get(key)).endswith(".toml")
+        if (name := str(document.get(key))).endswith(".toml")
     }
     try:
         _check_keys(RigFile, document)

@@ -23,7 +23,6 @@ class SerialRig:
         port: open serial port: `write`, `read`, `in_waiting`, `timeout`.
 
     Attributes:
-        commands, measurements: columns, as of `Rig`.
         bad_lines: number of lines that broke a rule and were passed over.
     """
 
@@ -33,12 +32,11 @@ class SerialRig:
         Raises:
             RigError: no answer, or other columns than those of the rig's file.
         """
-        self.commands, self.measurements = rig.commands, rig.measurements
         self.bad_lines = 0
         self._file, self._port, self._buffer = rig, port, LineBuffer()
         self._lines: list[bytes] = []
         self._number, self._last_bad = 0, ""
-        ours = ["pma-rig", "1", ",".join(self.commands), ",".join(self.measurements)]
+        ours = ["pma-rig", "1", ",".join(rig.commands), ",".join(rig.measurements)]
         theirs = self._ask("I", lambda words: words[0] == "I", _RESET_S)[1:]
         if theirs != ours:
             raise RigError(
@@ -56,8 +54,8 @@ class SerialRig:
         self._number += 1
         key = ["M", str(self._number)]
         words = self._ask(("R", self._number), lambda words: words[:2] == key)
-        width = len(self.commands)
-        values = numbers(words[2:], 3 + width + len(self.measurements))
+        width = len(self._file.commands)
+        values = numbers(words[2:], 3 + width + len(self._file.measurements))
         if values[1]:
             raise RigError(
                 f"{self._file.port}: the rig is in its safe state: no command arrived for "

@@ -25,6 +25,7 @@ from pma_gym.bench import ControlLoop, RigError, TrialLog, open_rig, read_rig_fi
 from pma_gym.bench.emulator import Firmware
 from pma_gym.bench.line_format import LONGEST, LineBuffer, decoded, encoded
 from pma_gym.data.datasets.dataset import read_dataset
+from pma_gym.discovery import diagnose
 from pma_gym.plant.plant import Plant
 from pma_gym.tasks import TASKS
 from tests.bench.fake_rig import HOST, STATION_RIG, Clock, FakeRig, write_slide
@@ -347,3 +348,35 @@ def test_a_killed_host_a_cut_line_and_noise_leave_a_safe_rig_and_a_log(tmp_path)
 def test_fifty_broken_runs_are_safe_within_a_tenth_of_a_second(tmp_path):
     ways = itertools.islice(itertools.cycle(["kill", "cut", "noise"]), 50)
     broken_runs(tmp_path, ways, 50, SAFE_NS)
+
+
+CONTROLLER = '''
+class SlidePD:
+    """Pull along a reference, 100 N/V about 5 V."""
+
+    name = "slide_pd"
+
+    def reset(self, reference, station):
+        self.reference, self.period, self.last = reference, station.period, 0.0
+
+    def act(self, measurement, time):
+        error = self.reference(time) - measurement.extension
+        change, self.last = (error - self.last) / self.period, error
+        return min(max(5.0 + 20.0 * error + 1.5 * change, 0.0), 10.0)
+'''
+
+
+@pytest.mark.campaign
+def test_friction_that_a_rig_hides_is_named_from_its_logs_as_they_are(tmp_path):
+    path = write_slide(tmp_path, "emulator", watchdog=500)
+    (tmp_path / "mine.py").write_text(CONTROLLER)
+    words = ["--controller", f"{tmp_path}/mine.py:SlidePD", "--task", "multisine,multisine_2"]
+    command = [sys.executable, "-m", "benchmarks", "rig", path, *words, "--out", tmp_path / "log"]
+    subprocess.run(command, check=True)
+    dataset = read_dataset(tmp_path / "log")
+    diagnosis = diagnose(dataset, propose=False)
+    (friction,) = [each for each in diagnosis.effects if each.name == "coulomb_friction"]
+    assert friction.parameters["dynamic_n"].value == pytest.approx(12.0, rel=0.15)
+    assert "coulomb_friction" in diagnosis.model.parameters
+    (gap,) = diagnosis.gap.values()
+    assert gap.after < 0.05 * gap.before, diagnosis.sentence
