@@ -17,7 +17,7 @@ def encoded(*words: object) -> bytes:
     r"""The line of some words, with its checksum, CRC-16 with polynomial 1021 from FFFF.
 
     >>> encoded("R", 7)
-    b'R 7*BC60\\n'
+    b'R 7*BC60\n'
     """
     text = " ".join(f"{word:.9g}" if isinstance(word, float) else str(word) for word in words)
     content = text.encode("ascii", "replace")

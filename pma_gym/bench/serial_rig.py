@@ -10,6 +10,7 @@ from typing import Any
 from pma_gym.bench.line_format import LineBuffer, decoded, encoded, numbers
 from pma_gym.bench.rig import RigError, Sample
 from pma_gym.bench.rig_file import RigFile
+from pma_gym.plant.model import load_model
 
 _RESET_S = 3.0
 """How long a board may take to answer at first: opening a port resets some (assumption)."""
@@ -154,6 +155,8 @@ def _port_name(rig: RigFile) -> Iterator[str]:
         yield rig.port
         return
     model = rig.emulated_model or rig.model
+    # Its errors are said here, not by the other process.
+    load_model(model)
     command = [sys.executable, "-m", "pma_gym.bench.emulator", model, str(rig.seed)]
     pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True}
     # A session of its own: Ctrl-C in the terminal is for the host alone.

@@ -30,6 +30,7 @@ from pma_gym.plant.plant import Plant
 from pma_gym.tasks import TASKS
 from tests.bench.fake_rig import HOST, STATION_RIG, Clock, FakeRig, write_slide
 
+SIGNALS = {"kill": signal.SIGKILL, "interrupt": signal.SIGINT}
 SAFE_NS = 100_000_000
 """Time after which a rig without a host is safe."""
 
@@ -285,14 +286,15 @@ def emulated(folder):
         emulator.close()
 
 
-def killed(path, log, rows):
-    """Kill a host after some rows; the time at which it happened (ns)."""
+def killed(number, path, log, rows):
+    """Send a signal to a host after some rows; the time at which it happened (ns)."""
     command = [sys.executable, "-c", HOST, path, log]
-    with subprocess.Popen(command, stdout=subprocess.PIPE) as host:
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.DEVNULL}
+    with subprocess.Popen(command, **pipes) as host:
         assert host.stdout
         count = sum(bool(host.stdout.readline()) for _ in range(rows))
         when = time.monotonic_ns()
-        host.send_signal(signal.SIGKILL)
+        host.send_signal(number)
     return when if count == rows else 0
 
 
@@ -326,8 +328,8 @@ def broken_runs(folder, ways, watchdog, within):
             for _ in range(9):
                 if when:
                     break
-                if how == "kill":
-                    when = killed(path, log, rows)
+                if how in SIGNALS:
+                    when = killed(SIGNALS[how], path, log, rows)
                 else:
                     when = disturbed(how, emulator, path, log, rows)
                 word, safe = emulator.line(20.0).split()
@@ -341,12 +343,12 @@ def broken_runs(folder, ways, watchdog, within):
 
 def test_a_killed_host_a_cut_line_and_noise_leave_a_safe_rig_and_a_log(tmp_path):
     # Wide: a loaded machine, not the watchdog, takes this long.
-    broken_runs(tmp_path, ["kill", "cut", "noise"], 200, 50 * SAFE_NS)
+    broken_runs(tmp_path, ["kill", "cut", "noise", "interrupt"], 200, 50 * SAFE_NS)
 
 
 @pytest.mark.campaign
 def test_fifty_broken_runs_are_safe_within_a_tenth_of_a_second(tmp_path):
-    ways = itertools.islice(itertools.cycle(["kill", "cut", "noise"]), 50)
+    ways = itertools.islice(itertools.cycle(["kill", "cut", "noise", "interrupt"]), 50)
     broken_runs(tmp_path, ways, 50, SAFE_NS)
 
 
