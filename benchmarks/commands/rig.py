@@ -14,7 +14,6 @@ if TYPE_CHECKING:
     from controllers.registry import Controller
     from pma_gym.bench import RigFile, Sample, Step
     from pma_gym.bench.control_loop import Act
-    from pma_gym.envs import Measurement
     from pma_gym.tasks import Task
 
 
@@ -34,9 +33,11 @@ def rig(
     from pma_gym.bench import ControlLoop, TrialLog, open_rig, read_rig_file
 
     content = read_rig_file(file)
-    (spec,) = parse_controllers(controller)[:1]
+    spec, *others = parse_controllers(controller)
+    if others or spec.is_bound:
+        raise ValueError(f"a rig takes one controller, and not the oracle, got {controller}")
     tasks = [_task(name) for name in listed(task)]
-    log, folder = None, out or RESULTS / "rig" / file.stem
+    folder = out or RESULTS / "rig" / file.stem
     log = TrialLog(folder, content)
     # Whoever ends this process ends it by way of the rig's safe state.
     for ending in (signal.SIGTERM, signal.SIGHUP):
@@ -52,7 +53,7 @@ def rig(
     except KeyboardInterrupt:
         print(f"Interrupted; the rig is in its safe state, rows are kept in {folder}")
         raise typer.Exit(INTERRUPTED) from None
-    except OSError as error:
+    except (OSError, ImportError) as error:
         refuse(error)
     print(f"Trials: {folder}")
 
@@ -72,12 +73,14 @@ def station_act(file: "RigFile", task: "Task", controller: "Controller") -> "Act
     """What a controller does with a rig's measurements, after its reset.
 
     The other command, where there are two, keeps its start value. Positions count from the first
-    measurement.
+    measurement; what the rig does not measure is 0.
     """
     from benchmarks.runner.rollout import checked_volts
-    from pma_gym.envs import StationInfo
+    from pma_gym.data.trial_columns import COLUMNS
+    from pma_gym.envs import Measurement, StationInfo
     from pma_gym.envs.station_info import Reference
     from pma_gym.plant.model import load_model
+    from pma_gym.units import SI_FACTORS
 
     model, start = load_model(file.model), file.start
     line, driven = model.parameters.get("regulator_line"), int(task.actuator == "regulator")
@@ -86,39 +89,28 @@ def station_act(file: "RigFile", task: "Task", controller: "Controller") -> "Act
     pressure = line.gain * start[1] + line.offset if line else 0.0
     info = StationInfo(model, task, pressure, 1.0 / file.rate_hz)
     controller.reset(Reference(task.schedule), info)
-    first: list[Measurement] = []
+    columns = {column.name: column for column in COLUMNS}
+    kept = [(columns[n].quantity, SI_FACTORS[columns[n].unit]) for n in file.measurements]
+    zeros: dict[str, float] = {}
 
     def act(time: float, sample: "Sample") -> Sequence[float]:
-        measurement = _measurement(file, time, sample)
-        first.append(measurement) if not first else None
-        counted = measurement._replace(
-            extension=measurement.extension - first[0].extension,
-            rotation=measurement.rotation - first[0].rotation,
+        pairs = zip(kept, sample.values, strict=True)
+        known = {name: value * factor for (name, factor), value in pairs}
+        if time <= 0.0:
+            zeros.update(known)
+        moved = {name: value - zeros[name] for name, value in known.items()}
+        measurement = Measurement(
+            time,
+            -moved.get("contraction", 0.0),
+            moved.get("rotation", moved.get("angle", 0.0)),
+            known.get("load", known.get("force", 0.0)),
+            known.get("pressure", 0.0),
         )
         commands = list(start)
-        commands[driven] = checked_volts(controller.act(counted, time), time)
+        commands[driven] = checked_volts(controller.act(measurement, time), time)
         return commands
 
     return act
-
-
-def _measurement(file: "RigFile", time: float, sample: "Sample") -> "Measurement":
-    """A sample in SI; what the rig does not measure is 0."""
-    from pma_gym.data.trial_columns import COLUMNS
-    from pma_gym.envs import Measurement
-    from pma_gym.units import SI_FACTORS
-
-    columns = {column.name: column for column in COLUMNS}
-    known = {}
-    for name, value in zip(file.measurements, sample.values, strict=True):
-        known[columns[name].quantity] = value * SI_FACTORS[columns[name].unit]
-    return Measurement(
-        time,
-        -known.get("contraction", 0.0),
-        known.get("rotation", known.get("angle", 0.0)),
-        known.get("load", known.get("force", 0.0)),
-        known.get("pressure", 0.0),
-    )
 
 
 def _summary(steps: "Sequence[Step]") -> str:

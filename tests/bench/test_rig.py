@@ -199,7 +199,7 @@ def test_a_line_that_fails_is_said_with_what_came(answer, message, tmp_path, mon
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("range", "rnage", "keys are range, rate, rest, start, got 'rnage'"),
+        ("range", "ranges", "keys are range, rate, rest, start, got 'ranges'"),
         ("rest = 5", "rest = 11", "commands.motor_voltage_v: 11 must lie in its range, 0 to 10"),
         ('"vent"', '"pray"', "safe.action must be vent, hold, ramp"),
         ("watchdog_ms = 1000", "watchdog_ms = 15", "watchdog_ms in two periods to 1000 ms"),
