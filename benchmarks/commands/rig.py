@@ -96,7 +96,7 @@ def station_act(file: "RigFile", task: "Task", controller: "Controller") -> "Act
     def act(time: float, sample: "Sample") -> Sequence[float]:
         pairs = zip(kept, sample.values, strict=True)
         known = {name: value * factor for (name, factor), value in pairs}
-        if time <= 0.0:
+        if not zeros:
             zeros.update(known)
         moved = {name: value - zeros[name] for name, value in known.items()}
         measurement = Measurement(
