@@ -353,8 +353,10 @@ def test_fifty_broken_runs_are_safe_within_a_tenth_of_a_second(tmp_path):
 
 
 CONTROLLER = '''
+import math
+
 class SlidePD:
-    """Pull along a reference, 100 N/V about 5 V."""
+    """Pull along a reference and shake at 2 Hz, so that inertia shows; 5 V are no force."""
 
     name = "slide_pd"
 
@@ -364,7 +366,8 @@ class SlidePD:
     def act(self, measurement, time):
         error = self.reference(time) - measurement.extension
         change, self.last = (error - self.last) / self.period, error
-        return min(max(5.0 + 20.0 * error + 1.5 * change, 0.0), 10.0)
+        volts = 5.0 + 20.0 * error + 1.5 * change + 0.4 * math.sin(4.0 * math.pi * time)
+        return min(max(volts, 0.0), 10.0)
 '''
 
 
