@@ -10,7 +10,7 @@ BENCH_ARGS ?=
 EXAMPLES ?= 100000
 NAMES ?=
 
-EXTRAS = bench,rl,rllib,scale,mpc,policies,onnx,view,files,symbolic,foreign,docs,dev
+EXTRAS = bench,rl,rllib,scale,mpc,policies,onnx,view,files,symbolic,foreign,rig,docs,dev
 # Windows has its programs elsewhere, with another ending.
 BIN = $(VENV)/$(if $(filter Windows_NT,$(OS)),Scripts,bin)
 PIP = $(BIN)/pip$(if $(filter Windows_NT,$(OS)),.exe)
@@ -63,7 +63,7 @@ test-integrations: | $(PIP) ## Train shortly with other libraries (.integrations
 # The extras of what the project runs with, each requirement at its lower bound, all of them together.
 # Old releases announce deprecations of what newer ones of theirs left: those are no fault here.
 LOWER = .lower-bounds
-LOWER_EXTRAS = bench,rl,rllib,scale,mpc,policies,onnx,view,files,symbolic
+LOWER_EXTRAS = bench,rl,rllib,scale,mpc,policies,onnx,view,files,symbolic,rig
 LOWER_TESTS = tests/test_requirements.py tests/test_cli.py tests/data tests/codegen \
     tests/integrator tests/plant tests/estimation tests/controllers tests/engine tests/envs tests/sb3
 

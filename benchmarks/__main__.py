@@ -5,7 +5,8 @@ import sys
 
 # In the order in which --help lists the commands.
 # isort: off
-from benchmarks.commands import runs, dissertation, settings, hidden_effects, training, exercise  # noqa: F401
+from benchmarks.commands import runs, dissertation, settings, hidden_effects  # noqa: F401
+from benchmarks.commands import training, exercise, rig  # noqa: F401
 
 # isort: on
 from benchmarks.commands.options import app
