@@ -142,15 +142,7 @@ class _Work:
         named, words = prepared(dataset.trials, given)
         trials = [each.trial for each in named]
         if given.plant in PORTS:
-            every = _candidates(given, named) if search else None
-            own = free_parameters(given)
-            _check_size([Logged.of(given, i, trial) for i, trial in enumerate(trials)], own.free)
-            said = self._timed(
-                "grey box",
-                lambda: answered(
-                    given, named, every, dataset.tolerance, self.seed, self._tell, self.jobs
-                ),
-            )
+            said = self._likeliest(dataset, given, named, search)
             words = (*(dataset.checked or ()), *words, *said.warnings)
             return replace(said, warnings=words, seconds=dict(self.seconds))
         given, slower = with_recorded_bandwidth(given, trials)
@@ -198,6 +190,16 @@ class _Work:
         )
         warnings = (*words, *diagnosis.warnings)
         return replace(diagnosis, warnings=warnings, seconds=dict(self.seconds))
+
+    def _likeliest(
+        self, dataset: Dataset, given: Model, named: Sequence[NamedTrial], search: bool
+    ) -> Diagnosis:
+        """The answer by one likelihood."""
+        every = _candidates(given, named) if search else None
+        logged = [Logged.of(given, i, each.trial) for i, each in enumerate(named)]
+        _check_size(logged, free_parameters(given).free)
+        options = dataset.tolerance, self.seed, self._tell, self.jobs
+        return self._timed("grey box", lambda: answered(given, named, every, *options))
 
     def _problem(
         self,
