@@ -218,7 +218,7 @@ def rigs_of(port: str) -> list[str]:
     """Rigs with a port where users can add effects.
 
     >>> rigs_of("joint_torque")
-    ['joint']
+    ['joint', 'muscle_joint', 'muscle_pair']
     """
     return [rig for rig, ports in OPEN_PORTS.items() if port in ports]
 

@@ -161,18 +161,18 @@ def mjcf(model: Model) -> str:
         gravity=GRAVITY,
         sensors="".join(sensors),
         command=direct_command(model) or "motor_voltage",
-        **_texts(amounts, "slide" if model.rig.signals[0].is_travel else "hinge"),
+        **_texts(amounts, turns=not model.rig.signals[0].is_travel),
     )
 
 
-def _texts(a: Mapping[str, float], kind: str) -> dict[str, str]:
+def _texts(a: Mapping[str, float], turns: bool) -> dict[str, str]:
     """Attributes of body, joint and actuator; `a` has the amounts by their words."""
     # About the place where the linear spring is relaxed.
     rest, cubic = a["rest"], a["cubic"]
     stiffness = a["stiffness"] + 3.0 * cubic * rest**2, 3.0 * cubic * rest, cubic
     bias = a["constant"] - cubic * rest**3
     mass, at, own = a["inertia"], (0.0, 0.0, 0.0), a["inertia"]
-    if kind == "hinge" and a["moment"]:
+    if turns and a["moment"]:
         # Half of the inertia is that of a point mass.
         arm = 0.5 * a["inertia"] * GRAVITY / a["moment"]
         mass, own = a["moment"] / GRAVITY / arm, 0.5 * a["inertia"]
@@ -186,8 +186,8 @@ def _texts(a: Mapping[str, float], kind: str) -> dict[str, str]:
         samples = math.ceil(a["delay"] / STEP_S) + 2
         actuator += f' delay="{a["delay"]!r}" nsample="{samples}" interp="linear"'
     return {
-        "kind": kind,
-        "axis": "1 0 0" if kind == "slide" else "0 1 0",
+        "kind": "hinge" if turns else "slide",
+        "axis": "0 1 0" if turns else "1 0 0",
         "body": f'pos="{_row(at)}" mass="{mass!r}" diaginertia="{_row((own, own, own))}"',
         "damping": _row((a["damping"], a["drag"]) if a["drag"] else (a["damping"],)),
         "friction": repr(a["friction"]),
