@@ -23,6 +23,9 @@ STEP = 1e-4
 MOST_ITERATIONS, LEAST_GAIN = 40, 0.05
 """Of a fit; it ends where an iteration gains less."""
 
+ROUGH = 25, 0.3
+"""The same of a fit that is only compared with others."""
+
 FACTORS = (0.0, 1.0, 10.0, 100.0, 1e3, 1e4, 1e5, 1e6)
 """Damping of the steps that are tried at once, in units of the present one."""
 
@@ -138,7 +141,11 @@ def with_tied(values: Mapping[str, float], tied: Mapping[str, str]) -> dict[str,
 
 
 def fit(
-    box: GreyBox, start: Point, coordinates: Sequence[Coordinate], tied: Mapping[str, str]
+    box: GreyBox,
+    start: Point,
+    coordinates: Sequence[Coordinate],
+    tied: Mapping[str, str],
+    rough: bool = False,
 ) -> Fit:
     """Greatest likelihood from a start.
 
@@ -147,7 +154,9 @@ def fit(
         start: where to begin, and the middle of the priors.
         coordinates: what is free.
         tied: slots that follow another slot.
+        rough: whether to end early, for a comparison of starts.
     """
+    most, least = ROUGH if rough else (MOST_ITERATIONS, LEAST_GAIN)
     origin = np.array([c.of(start) for c in coordinates])
     weight = np.array([1.0 / c.prior**2 if c.prior else 0.0 for c in coordinates])
 
@@ -167,7 +176,7 @@ def fit(
     best = float(valued([x])[0][0])
     information, scores = np.eye(p), np.zeros((BLOCKS, p))
     # A start whose filter fails has no slopes to go by: it is less likely than any other.
-    for _ in range(MOST_ITERATIONS if np.isfinite(best) else 0):
+    for _ in range(most if np.isfinite(best) else 0):
         signs = np.where(within(x + STEP) > x, STEP, -STEP)
         _, results = valued([x, *(x + np.diag(signs))])
         information, scores = _scored(box, results, signs)
@@ -191,7 +200,7 @@ def fit(
             break
         x, best = steps[at], float(values[at])
         damping = float(np.clip(damping * 10.0 ** (at - 2), 1e-6, 1e3))
-        if gain < LEAST_GAIN:
+        if gain < least:
             break
     return Fit(point(x), best, tuple(coordinates), dict(tied), information, scores)
 

@@ -84,15 +84,15 @@ class Conclusions:
         """The hypothesis that is proposed, with a delay.
 
         The last whose effects are surely of some size, and which predicts trials left out no worse.
-        Where predictions miss widely all the same, the last one carries more than a small share:
+        Where predictions miss widely all the same, it closes more than a small share of the gap:
         less than that is how approximate the others are.
         """
         best = self.path[0]
         for each in self.path[1:]:
             sized = all(self._is_sized(each, move) for move in each.moves)
-            if sized and self.misfit(each) <= self.misfit(best) * (1.0 + 1e-3):
-                carried = self.misfit(best) ** 2 - self.misfit(each) ** 2
-                if self.misfit(each) < NOISES or carried > SMALL * self.misfit(self.path[0]) ** 2:
+            first, before, after = (self.misfit(h) for h in (self.path[0], best, each))
+            if sized and after <= before * (1.0 + 1e-3):
+                if after < NOISES or np.log(before / after) > SMALL * np.log(first / after):
                     best = each
         return best
 
@@ -203,10 +203,9 @@ class Conclusions:
             return 0.0
         late, error = last.fit.point.delay, last.fit.deviations["delay"]
         row = self.selection.span / self.selection.stride / self.selection.block
-        # In an incomplete model, a line half a row late is no other than a held command in time.
-        alike = self.selection.linear and self.misfit(last) > COMPLETE
-        prompt = (0.0, 0.5 * row) if alike else (0.0,)
-        if min(abs(late - each) for each in prompt) < max(ROWS_LATE * row, CONFIDENCE * error):
+        # How an incomplete model's commands run between rows is not known to less than a row.
+        rows = ROWS_LATE if self.misfit(last) < COMPLETE else 1.0
+        if late < max(rows * row, CONFIDENCE * error):
             return 0.0
         price = np.log(len(self.candidates)) + self.selection.price_of(last, 1)
         return max(0.0, last.fit.value - self._prompt - float(price))

@@ -552,7 +552,7 @@ class EffectSelection:
         if not careful:
             # From none of it, a fit is no less likely than without.
             none = with_values(whole, with_tied({**at, **absent}, tied))
-            made = fit(box, none, [*now.fit.coordinates, *more], tied)
+            made = fit(box, none, [*now.fit.coordinates, *more], tied, rough=True)
             best = made if best is None or made.value > best.value else best
         assert best is not None
         return Hypothesis(box, best, (*now.moves, move), now.rivals)
@@ -631,7 +631,7 @@ class EffectSelection:
         for amount, share in ((0.0, 0.5), *further):
             there = float(np.clip(first + amount * abs(value), *bounds))
             start = with_values(now.fit.point, with_tied({name: there}, tied))
-            made = fit(now.box, self._weaker(start, share), coordinates, tied)
+            made = fit(now.box, self._weaker(start, share), coordinates, tied, rough=not careful)
             best = made if best is None or made.value > best.value else best
         assert best is not None
         return Hypothesis(now.box, best, (*now.moves, move), now.rivals)

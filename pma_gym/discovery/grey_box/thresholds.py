@@ -70,8 +70,8 @@ FAR = 3.0
 Assumption: a data sheet or a scale is off by less, so that beyond it the fit bends the value.
 """
 
-SMALL = 0.01
-"""Share of the first misfit (mean square) that an addition carries where much is left after it."""
+SMALL = 0.1
+"""Share of the gap (logarithm of the misfit) that an addition closes where much is left."""
 
 COMPLETE = 1.5
 """Noises that predictions of a complete model miss by at most, as for stations."""
