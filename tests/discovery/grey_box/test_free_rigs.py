@@ -152,6 +152,12 @@ def test_a_drive_that_weakens_from_trial_to_trial_is_said_with_its_size():
     assert said and not diagnosis.effects, diagnosis.sentence
     # Of 100 N/V.
     assert float(said[1]) == pytest.approx(-2.0, abs=0.3)
+    # Before, the latent force is what the drive has too much or too little of; after, nothing.
+    forces = [trial.latent for trial in diagnosis.trials]
+    for force, share in zip(forces, (-0.02, 0.0, 0.02), strict=True):
+        load = 100.0 * (force.over["motor voltage (V)"] - 5.0)
+        assert np.polyfit(load, force.before, 1)[0] == pytest.approx(share, abs=0.003)
+        assert np.std(force.after) < 0.001 * np.std(load)
 
 
 @pytest.mark.campaign
