@@ -183,15 +183,15 @@ def _parameter_blocks(diagnosis: Diagnosis) -> list[Block]:
 
 def _law_blocks(diagnosis: Diagnosis) -> list[Block]:
     law = diagnosis.law
-    if any(each.latent for each in diagnosis.trials):
+    forces = [each.latent for each in diagnosis.trials if each.latent]
+    if forces:
+        drawn_in = f" Blue, with its 95 % band, its law: it {law.words}." if law else ""
+        proposed = f"; green: {after_name(diagnosis)}" if forces[0].after is not None else ""
         caption = (
             "Smoothed latent force, which stands for all that the model lacks. Grey: parameters "
-            f"refitted, nothing added; green: {after_name(diagnosis)}. On top, the trials with "
-            "most of it before."
+            f"refitted, nothing added{proposed}. On top, the trials with most of it.{drawn_in}"
         )
-        drawn_in = f" The line, with its 95 % band, is its law: it {law.words}." if law else ""
-        heading = Heading("The latent force before and after")
-        return [heading, Picture("latent", f"{caption}{drawn_in}")]
+        return [Heading("The latent force before and after"), Picture("latent", caption)]
     if law is None:
         return []
     caption = f"What the model lacks, found by a flexible law: {law.quantity}. Band: 95 %."
