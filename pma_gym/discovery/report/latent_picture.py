@@ -90,7 +90,8 @@ def _by_trial(panel: Axes, forces: list[tuple[str, Array, LatentForce]]) -> None
         if sizes:
             bars = panel.barh(at + shift, sizes, 0.38, color=color)
             panel.bar_label(bars, [figure(each) for each in sizes], padding=2, fontsize="small")
-    panel.set_yticks(at, [name for name, *_ in forces])
+    # What tells long names apart is mostly at their ends.
+    panel.set_yticks(at, [name if len(name) < 17 else f"...{name[-14:]}" for name, *_ in forces])
     panel.margins(x=0.15)
     panel.grid(visible=False, axis="y")
     panel.set_xlabel(f"{forces[0][2].quantity}, rms")

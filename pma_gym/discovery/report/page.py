@@ -191,7 +191,8 @@ def _law_blocks(diagnosis: Diagnosis) -> list[Block]:
             "Smoothed latent force, which stands for all that the model lacks. Grey: parameters "
             f"refitted, nothing added{proposed}. On top, the trials with most of it.{drawn_in}"
         )
-        return [Heading("The latent force before and after"), Picture("latent", caption)]
+        heading = Heading(f"The latent force{' before and after' if proposed else ''}")
+        return [heading, Picture("latent", caption)]
     if law is None:
         return []
     caption = f"What the model lacks, found by a flexible law: {law.quantity}. Band: 95 %."
