@@ -12,6 +12,10 @@ from pma_gym.estimation.innovations import LATENT, SPEEDS, GreyBox, Point
 
 Array = NDArray[np.float64]
 
+SINGULAR = 1e-9
+"""Eigenvalues of correlations below this share of the largest are rounding: a friction with a short
+presliding leaves nearly none."""
+
 
 @dataclass(frozen=True)
 class Smoothed:
@@ -49,11 +53,7 @@ def smoothed(box: GreyBox, point: Point, number: int) -> Smoothed:
     kept, trial = box.kept(number, point), box.rows[number]
     mean, spread = kept.corrected.copy(), kept.certain.copy()
     for k in range(len(mean) - 2, -1, -1):
-        gain = (
-            kept.certain[k]
-            @ kept.transition[k + 1].T
-            @ np.linalg.pinv(kept.spread[k + 1], hermitian=True)
-        )
+        gain = kept.certain[k] @ kept.transition[k + 1].T @ _inverse(kept.spread[k + 1])
         mean[k] += gain @ (mean[k + 1] - kept.predicted[k + 1])
         spread[k] += gain @ (spread[k + 1] - kept.spread[k + 1]) @ gain.T
     at = {name: i for i, name in enumerate(kept.states)}
@@ -68,3 +68,10 @@ def smoothed(box: GreyBox, point: Point, number: int) -> Smoothed:
         mean[:, at[SPEEDS[box.model.plant]]],
         command,
     )
+
+
+def _inverse(covariance: Array) -> Array:
+    """Inverse within the directions that are uncertain, whatever the units of the states."""
+    spread = np.sqrt(np.diag(covariance))
+    units = np.outer(spread, spread) + (np.outer(spread, spread) == 0.0)
+    return np.linalg.pinv(covariance / units, rcond=SINGULAR, hermitian=True) / units

@@ -5,7 +5,7 @@ Verdict, sizes with intervals, gaps of predictions, the amended model.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +16,7 @@ from pma_gym.discovery.answer.trial_records import gaps
 from pma_gym.discovery.diagnosis import Verdict
 from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
 from pma_gym.discovery.grey_box.effect_selection import EffectSelection, Hypothesis, Move, slot
-from pma_gym.discovery.grey_box.latent_law import latent_law
+from pma_gym.discovery.grey_box.latent_law import latent_force, latent_law
 from pma_gym.discovery.grey_box.thresholds import (
     COMPLETE,
     CONFIDENCE,
@@ -306,10 +306,18 @@ class Conclusions:
         last, base = self.last, self.path[0]
         records = []
         signals = self.selection.model.rig.signals
+        ended = self._ended if last.moves else [None] * len(self.named)
+        forces = map(partial(latent_force, self.selection.model), self.smooth, ended)
         curves = zip(
-            self.named, last.box.rows, self.given, self.curves(base), self.curves(last), strict=True
+            self.named,
+            last.box.rows,
+            forces,
+            self.given,
+            self.curves(base),
+            self.curves(last),
+            strict=True,
         )
-        for each, trial, *models in curves:
+        for each, trial, force, *models in curves:
             shape = (len(trial.time), len(signals))
             measured, before, refitted, after = (np.full(shape, np.nan) for _ in range(4))
             own = {}
@@ -339,6 +347,7 @@ class Conclusions:
                     held,
                     each.file or each.name,
                     columns,
+                    force,
                 )
             )
         return tuple(records)

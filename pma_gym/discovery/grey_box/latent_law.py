@@ -4,12 +4,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from pma_gym.data.trial_columns import BY_QUANTITY
+from pma_gym.data.trial_columns import BY_QUANTITY, Column
 from pma_gym.discovery.grey_box.thresholds import CONFIDENCE
 from pma_gym.discovery.report.figure_text import percent, signal_name
-from pma_gym.discovery.result.misfit import ResidualLaw
+from pma_gym.discovery.result.misfit import LatentForce, ResidualLaw
 from pma_gym.estimation.smoother import Smoothed
+from pma_gym.plant.model import Model
 from pma_gym.plant.rigs.rig import Rig
+from pma_gym.plant.sensors import direct_command
 from pma_gym.units import SI_FACTORS
 
 FORCES = {"slide": ("force on the slide", "N"), "joint": ("torque on the joint", "N m")}
@@ -52,11 +54,32 @@ def latent_law(trials: Sequence[Smoothed], rig: Rig, rows: float) -> ResidualLaw
         return None
     explained, column, at, mean, wide = best
     what, unit = FORCES[rig.name]
-    name, share = signal_name(column.name), percent(max(explained, 0.0))
-    words = f"goes with {name}: that explains {share} of its mean square"
+    share = percent(max(explained, 0.0))
+    words = f"goes with {signal_name(column.name)}: that explains {share} of its mean square"
     return ResidualLaw(
-        f"{what} ({unit})", f"{name} ({column.unit})", at, mean, mean - wide, mean + wide, words
+        f"{what} ({unit})", _label(column), at, mean, mean - wide, mean + wide, words
     )
+
+
+def latent_force(model: Model, before: Smoothed, after: Smoothed | None) -> LatentForce:
+    """One trial's latent force, over all that it may go with.
+
+    Args:
+        model: of a slide or a joint.
+        before: with parameters refitted and nothing added.
+        after: with the proposed model; None where that adds nothing.
+    """
+    names = [signal.name for signal in model.rig.signals[:2]]
+    columns = [BY_QUANTITY[n] for n in (*names, direct_command(model) or "motor_voltage")]
+    values = (before.position, before.speed, before.command)
+    over = {_label(c): v / SI_FACTORS[c.unit] for c, v in zip(columns, values, strict=True)}
+    what, unit = FORCES[model.rig.name]
+    return LatentForce(f"{what} ({unit})", before.force, after and after.force, over)
+
+
+def _label(column: Column) -> str:
+    """Of an axis."""
+    return f"{signal_name(column.name).replace('_', ' ')} ({column.unit})"
 
 
 def largest_share(trials: Sequence[Smoothed]) -> tuple[int, float]:

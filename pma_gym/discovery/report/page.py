@@ -15,6 +15,7 @@ from pma_gym.discovery.report.effect_text import (
     readable,
 )
 from pma_gym.discovery.report.figure_text import capitalised, chance, duration, odds
+from pma_gym.discovery.report.latent_picture import latent_picture
 from pma_gym.discovery.report.next_steps import what_to_do
 from pma_gym.discovery.report.pictures import (
     after_name,
@@ -77,10 +78,10 @@ def report_blocks(diagnosis: Diagnosis, title: str, origin: Mapping[str, str]) -
     blocks += [Heading("What to do now"), Steps(what_to_do(diagnosis))]
     blocks += _where_blocks(diagnosis)
     blocks += _gap_blocks(diagnosis)
+    blocks += _law_blocks(diagnosis)
     for effect in diagnosis.effects:
         blocks += _effect_blocks(effect)
     blocks += _parameter_blocks(diagnosis)
-    blocks += _law_blocks(diagnosis)
     blocks += _confusion_blocks(diagnosis)
     blocks += _next_blocks(diagnosis)
     return blocks + decision_blocks(diagnosis, origin)
@@ -99,7 +100,9 @@ def report_pictures(diagnosis: Diagnosis) -> dict[str, bytes]:
         pictures["worst"] = curves_picture(worst, diagnosis)
     if diagnosis.maps:
         pictures["maps"] = map_picture(diagnosis.maps[:_MOST_MAPS])
-    if diagnosis.law:
+    if any(each.latent for each in diagnosis.trials):
+        pictures["latent"] = latent_picture(diagnosis)
+    elif diagnosis.law:
         pictures["law"] = law_picture(diagnosis.law)
     if diagnosis.next_experiment:
         pictures["next"] = commands_picture(diagnosis.next_experiment.trial)
@@ -180,6 +183,16 @@ def _parameter_blocks(diagnosis: Diagnosis) -> list[Block]:
 
 def _law_blocks(diagnosis: Diagnosis) -> list[Block]:
     law = diagnosis.law
+    forces = [each.latent for each in diagnosis.trials if each.latent]
+    if forces:
+        drawn_in = f" Blue, with its 95 % band, its law: it {law.words}." if law else ""
+        proposed = f"; green: {after_name(diagnosis)}" if forces[0].after is not None else ""
+        caption = (
+            "Smoothed latent force, which stands for all that the model lacks. Grey: parameters "
+            f"refitted, nothing added{proposed}. On top, the trials with most of it.{drawn_in}"
+        )
+        heading = Heading(f"The latent force{' before and after' if proposed else ''}")
+        return [heading, Picture("latent", caption)]
     if law is None:
         return []
     caption = f"What the model lacks, found by a flexible law: {law.quantity}. Band: 95 %."

@@ -94,6 +94,23 @@ class ResidualLaw:
 
 
 @dataclass(frozen=True)
+class LatentForce:
+    """What stands for all that a model of a free rig lacks, in one trial; shape (rows,) each.
+
+    Attributes:
+        quantity: what it is, `force on the slide (N)`.
+        before: smoothed, parameters refitted and nothing added (SI).
+        after: smoothed, of the proposed model; None where that adds nothing.
+        over: what it may depend on, in the unit that its name has, `contraction (mm)`.
+    """
+
+    quantity: str
+    before: Array
+    after: Array | None
+    over: Mapping[str, Array]
+
+
+@dataclass(frozen=True)
 class TrialRecord:
     """One trial's curves, for the report; SI, shape (rows, signals), NaN = gap.
 
@@ -108,6 +125,7 @@ class TrialRecord:
         held_out: see `after`.
         file: the log that it is a piece of, or its own name.
         columns: of the signals, in their order.
+        latent: force that the model lacks; None where the method has none.
     """
 
     name: str
@@ -120,6 +138,7 @@ class TrialRecord:
     held_out: bool
     file: str = ""
     columns: tuple[str, ...] = ()
+    latent: LatentForce | None = None
 
 
 @dataclass(frozen=True)

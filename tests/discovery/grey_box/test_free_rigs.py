@@ -14,7 +14,10 @@ from pma_gym.data.datasets.dataset import read_dataset
 from pma_gym.data.trial import Trial
 from pma_gym.discovery import diagnose
 from pma_gym.effects import CATALOGUE
+from pma_gym.estimation.innovations import Point
+from pma_gym.estimation.smoother import smoothed
 from pma_gym.plant.model import Model
+from tests.estimation.linear_slide import box
 
 RATE_HZ, SUBSTEPS = 100, 50
 
@@ -152,6 +155,12 @@ def test_a_drive_that_weakens_from_trial_to_trial_is_said_with_its_size():
     assert said and not diagnosis.effects, diagnosis.sentence
     # Of 100 N/V.
     assert float(said[1]) == pytest.approx(-2.0, abs=0.3)
+    # Before, the latent force is what the drive has too much or too little of; after, nothing.
+    forces = [trial.latent for trial in diagnosis.trials]
+    for force, share in zip(forces, (-0.02, 0.0, 0.02), strict=True):
+        load = 100.0 * (force.over["motor voltage (V)"] - 5.0)
+        assert np.polyfit(load, force.before, 1)[0] == pytest.approx(share, abs=0.003)
+        assert np.std(force.after) < 0.001 * np.std(load)
 
 
 @pytest.mark.campaign
@@ -162,6 +171,18 @@ def test_dry_friction_that_the_model_lacks_is_named_with_its_size(plant):
     assert sizes[DRY[plant]][SIZE[plant]].value == pytest.approx(RIGS[plant][2], rel=0.05)
     assert inertia_of(diagnosis, plant) == pytest.approx(1.0, rel=0.02)
     assert diagnosis.verdict == "effect" and set(sizes) == {DRY[plant]}, diagnosis.sentence
+
+
+@pytest.mark.parametrize("presliding_deg", [1.6e-4, 2e-3])
+def test_the_latent_force_beside_a_friction_that_hardly_gives_is_small(presliding_deg):
+    *_, noise, _, reading = RIGS["joint"]
+    trials, known = logs("joint", 2.0), model("joint", inertia=1.0, presliding=presliding_deg)
+    made = box(trials, known, steps=32)
+    for i, trial in enumerate(trials):
+        smooth = smoothed(made, Point(made.numbers(), (noise,), (1e-3,) * 3, 0.06), i)
+        # Of 0.1 N m of friction.
+        assert np.abs(smooth.force).max() < 0.005
+        assert np.abs(smooth.position - trial.measurements[reading]).max() < 5.0 * noise
 
 
 @pytest.mark.campaign

@@ -1,14 +1,18 @@
 """The page of a diagnosis: whole, self-contained, in words, for every verdict."""
 
 import re
+from dataclasses import replace
 from functools import cache
 from html.parser import HTMLParser
 
+import numpy as np
 import pytest
 
+from pma_gym.discovery.report import latent_picture
 from pma_gym.discovery.report.curves import worst_trial
 from pma_gym.discovery.report.effect_text import effect_equation, effect_summary
 from pma_gym.discovery.report.page import report_blocks, report_page, report_pictures
+from pma_gym.discovery.result.misfit import LatentForce, TrialRecord
 from pma_gym.effects import CATALOGUE
 from pma_gym.pages.document import Heading, Picture, to_markdown
 
@@ -102,6 +106,31 @@ def test_the_worst_trial_is_the_one_missed_by_most(example):
         return max(gap.before / gap.floor for gap in trial.gaps.values())
 
     assert worst_trial(example) == max(example.trials, key=missed)
+
+
+@pytest.mark.parametrize("added", [True, False])
+def test_the_latent_force_is_drawn_over_all_that_it_may_go_with(diagnoses, monkeypatch, added):
+    time, rest = np.linspace(0.0, 9.0, 2500), np.full((2500, 1), np.nan)
+    over = {name: np.sin(time) for name in ("contraction (mm)", "speed (mm/s)", "load (N)")}
+    trials = []
+    for size in (2.0, 8.0):
+        after = np.ones(2500) if added else None
+        force = LatentForce("force on the slide (N)", np.full(2500, size), after, over)
+        trials.append(TrialRecord(f"{size}.csv", time, *[rest] * 4, {}, False, latent=force))
+    diagnosis = replace(diagnoses["unknown"], trials=tuple(trials))
+    pictures = report_pictures(diagnosis)
+    assert 'alt="Smoothed latent force' in report_page(diagnosis) and "law" not in pictures
+    monkeypatch.setattr(latent_picture, "png", lambda figure: figure)
+    first, *panels, sizes = latent_picture.latent_picture(diagnosis).axes
+    assert first.get_title("left") == "8.0.csv"
+    lines = {panel.get_xlabel(): panel.get_lines() for panel in panels}
+    assert set(lines) == {"time (s)", *over}
+    # Before, perhaps after, zero, and the law where it belongs.
+    for name, drawn in lines.items():
+        assert len(drawn) == 2 + added + (name == diagnosis.law.variable)
+        assert all(len(line.get_xdata()) <= 1000 for line in drawn)
+    assert {panel.get_ylabel() for panel in panels} == {"force\non the slide (N)"}
+    assert [bar.get_width() for bar in sizes.patches] == [8.0, 2.0] + [1.0, 1.0] * added
 
 
 @pytest.mark.parametrize("name", CATALOGUE)
