@@ -119,7 +119,7 @@ def record(
     to: Annotated[
         Literal["parquet", "minari"],
         typer.Option(help="A file an episode, or a Minari data set a task."),
-    ],
+    ] = "parquet",
     controllers: Annotated[
         str, typer.Option(help="Names or path/to/file.py:ClassName, by commas; or all.")
     ] = "all",

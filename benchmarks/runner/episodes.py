@@ -28,7 +28,7 @@ from pma_gym.envs import PMAEnv
 
 
 @dataclass(frozen=True)
-class Record:
+class Recording:
     """What went between an environment and whoever drives it, in an episode.
 
     Attributes:
@@ -48,7 +48,9 @@ class Record:
     infos: Mapping[str, NDArray[Any]]
 
 
-def record_actions(environment: PMAEnv, origin: Mapping[str, str], actions: NDArray[Any]) -> Record:
+def record_actions(
+    environment: PMAEnv, origin: Mapping[str, str], actions: NDArray[Any]
+) -> Recording:
     """The episode that actions lead to from the seed of `origin`; the same bits each time."""
     observation, info = environment.reset(seed=int(origin["seed"]))
     observations, infos, rewards, terminated = [observation], [info], [], False
@@ -58,12 +60,12 @@ def record_actions(environment: PMAEnv, origin: Mapping[str, str], actions: NDAr
         infos.append(info)
         rewards.append(reward)
     columns = {key: np.array([info[key] for info in infos]) for key in infos[0]}
-    return Record(
+    return Recording(
         origin, np.array(observations), actions, np.array(rewards), bool(terminated), columns
     )
 
 
-def record_case(case: Case) -> Record:
+def record_case(case: Case) -> Recording:
     """Drive a case and record its episode.
 
     Raises:
@@ -82,7 +84,7 @@ def record_case(case: Case) -> Record:
 def record_cases(
     cases: Sequence[Case], to: str, out: Path, executor: Executor
 ) -> dict[str, BaseException]:
-    """Record cases and write their data sets.
+    """Recording cases and write their data sets.
 
     Args:
         cases: who drives what.
@@ -97,7 +99,7 @@ def record_cases(
     """
     needed("pyarrow" if to == "parquet" else "minari", f"--to {to}")
     failed = dict[str, BaseException]()
-    tasks = defaultdict[str, dict[int, Record]](dict)
+    tasks = defaultdict[str, dict[int, Recording]](dict)
 
     def keep(index: int, result: Any) -> None:  # noqa: ANN401
         case = cases[index]
@@ -117,7 +119,7 @@ def record_cases(
     return failed
 
 
-def encode_record(record: Record) -> bytes:
+def encode_record(record: Recording) -> bytes:
     """A Parquet file: a row a control step, and a last one without action and reward."""
     columns = {f"observation_{i}": values for i, values in enumerate(record.observations.T)}
     columns |= {f"action_{i}": _longer(values) for i, values in enumerate(record.actions.T)}
@@ -126,7 +128,7 @@ def encode_record(record: Record) -> bytes:
     return encode_parquet(columns, {**record.origin, "terminated": str(record.terminated)})
 
 
-def read_record(path: Path) -> Record:
+def read_record(path: Path) -> Recording:
     """Read an episode that `encode_record` wrote, with the same bits.
 
     Raises:
@@ -140,7 +142,7 @@ def read_record(path: Path) -> Record:
     def named(prefix: str) -> dict[str, NDArray[Any]]:
         return {k.removeprefix(prefix): v for k, v in columns.items() if k.startswith(prefix)}
 
-    return Record(
+    return Recording(
         origin,
         np.stack(list(named("observation_").values()), axis=1),
         np.stack(list(named("action_").values()), axis=1)[:-1],
@@ -150,7 +152,7 @@ def read_record(path: Path) -> Record:
     )
 
 
-def write_minari(records: Sequence[Record], environment: PMAEnv, out: Path) -> None:
+def write_minari(records: Sequence[Recording], environment: PMAEnv, out: Path) -> None:
     """Write the episodes of a task as a Minari data set, `pma-gym/SUITE-TASK-vVERSION`.
 
     Args:
@@ -181,7 +183,7 @@ def write_minari(records: Sequence[Record], environment: PMAEnv, out: Path) -> N
     data.storage.update_episode_metadata([dict(record.origin) for record in records])
 
 
-def _minari_parts(record: Record) -> dict[str, Any]:
+def _minari_parts(record: Recording) -> dict[str, Any]:
     last = np.arange(1, len(record.rewards) + 1) == len(record.rewards)
     return {
         "observations": record.observations,
