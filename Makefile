@@ -29,7 +29,7 @@ export NO_MKDOCS_2_WARNING = 1
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 .PHONY: help bench peers test test-campaigns examples fuzz test-integrations test-lower-bounds kills lint style types layers
-.PHONY: test-browser spelling pages forms docs build release-check clean distclean
+.PHONY: test-browser spelling pages forms docs build release-check archive clean distclean
 
 help: ## Show this list.
 	@echo "Targets:"
@@ -126,16 +126,32 @@ build: $(FULL) ## Build wheels and sdists of pma-gym and pma-gym-bench into dist
 RELEASE = $(abspath .release)
 RELEASED = $(RELEASE)/$(1)/bin/python -m pip install --disable-pip-version-check $(PIP_FLAGS) -c constraints.txt
 
-release-check: build ## Install wheels and sdist into clean environments (.release/); run the demo and one score.
+OFFERED = from importlib.metadata import metadata; print(*metadata('pma-gym').get_all('Provides-Extra'))
+
+release-check: build ## Install wheels and sdist into clean environments (.release/); run each, resolve every extra.
 	rm -rf "$(RELEASE)"
 	for each in wheel sdist; do "$(PYTHON)" -m venv "$(RELEASE)/$$each" || exit 1; done
 	$(call RELEASED,sdist) dist/pma_gym-*.tar.gz
 	$(call RELEASED,wheel) dist/pma_gym-*.whl
 	for each in wheel sdist; do \
-	    (cd "$(RELEASE)/$$each" && bin/python -m pma_gym.demo && bin/pma-gym --version) || exit 1; done
+	    (cd "$(RELEASE)/$$each" && bin/python -m pma_gym.demo && bin/pma-gym --version && \
+	    printf 'time_s,motor_voltage_v,regulator_voltage_v\n0,1,5\n2,3,5\n' > ramp.csv && \
+	    bin/pma-gym simulate ramp.csv --out trial.csv) || exit 1; done
+	for each in $$("$(RELEASE)/wheel/bin/python" -c "$(OFFERED)"); do \
+	    $(call RELEASED,wheel) --dry-run --find-links dist "pma-gym[$$each]" || exit 1; done
 	$(call RELEASED,wheel) --find-links dist pma-gym-bench
 	cd "$(RELEASE)/wheel" && bin/python -c "import pma_gym_controllers, pma_gym_benchmarks" && \
 	    bin/pma-gym-bench --controllers pid --task displacement --pressures 300 --jobs 1 --out score
+
+ARCHIVED = benchmarks/suites pma_gym/data/serres2008 docs/figures docs/images docs/results.md \
+    docs/leaderboards.md docs/diagnosis-results.md docs/notebook LICENSE CITATION.cff .zenodo.json
+DATA = pma-gym-data-$(shell sed -n 's/^version: //p' CITATION.cff)
+
+archive: ## Pack suites, tables and figures for Zenodo, with SHA256SUMS, into dist/ (GNU tar).
+	rm -rf build/$(DATA) && mkdir -p build/$(DATA) dist
+	git ls-files $(ARCHIVED) | grep -v '[.]py$$' | xargs cp --parents -t build/$(DATA)
+	cd build/$(DATA) && find . -type f | sort | xargs sha256sum > ../SHA256SUMS && mv ../SHA256SUMS .
+	tar -C build --sort=name --owner=0 --group=0 --mtime=@0 -c $(DATA) | gzip -n > dist/$(DATA).tar.gz
 
 clean: ## Remove what the tools generated, but no environment (.venv, .peers...) and not results/.
 	rm -rf build dist site *.egg-info .pytest_cache .ruff_cache .hypothesis .import_linter_cache

@@ -26,7 +26,7 @@ PROGRAMS = {"pma-gym": pma_gym.cli.app, "python -m benchmarks": benchmarks.__mai
 GROUPS = {name: typer.main.get_command(app) for name, app in PROGRAMS.items()}
 COMMANDS = [(program, name) for program, group in GROUPS.items() for name in group.commands]
 # It lists what it does without a command, and two dozen commands.
-LONG = {"python -m benchmarks": 41}
+LONG = {"python -m benchmarks": 42}
 
 
 WITH_MODEL = [

@@ -1,5 +1,6 @@
 """What is shipped: one version, a demonstration without a clone, a second wheel of other names."""
 
+import json
 import re
 import subprocess
 import sys
@@ -24,6 +25,11 @@ def test_the_version_has_one_place():
     assert f"\nversion: {pma_gym.__version__}\n" in citation
     newest = re.search(r"^## \[(\d[^\]]*)\]", (ROOT / "CHANGELOG.md").read_text("utf-8"), re.M)
     assert newest and newest[1] == pma_gym.__version__
+    archive = json.loads((ROOT / ".zenodo.json").read_text(encoding="utf-8"))
+    assert archive["version"] == pma_gym.__version__
+    assert archive["license"] == "MIT" and f"\nlicense: {archive['license']}\n" in citation
+    # Zenodo refuses an upload without these.
+    assert all(archive[key] for key in ("title", "upload_type", "description", "creators"))
 
 
 def test_the_demonstration_prints_two_numbers_and_draws_them(tmp_path, capsys):

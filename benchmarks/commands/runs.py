@@ -1,7 +1,8 @@
 """The commands about suites, their runs and comparisons; `targets` is for maintainers alone."""
 
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -18,6 +19,9 @@ from benchmarks.executors.executor import Executor
 from benchmarks.files import RESULTS
 from pma_gym.cli.options import JsonOption
 from pma_gym.cli.terminal import print_json, print_table
+
+if TYPE_CHECKING:
+    from benchmarks.suites.suite import Entry, FrozenSuite
 
 
 @app.command(hidden=True, epilog="Example: python -m benchmarks targets robust")
@@ -91,30 +95,72 @@ def run(
         return
     if not suite:
         raise ValueError("run needs --suite NAME, or --model FILE for any rig")
-    from benchmarks.comparison.job import chosen, run_comparison
+    from benchmarks.comparison.job import run_comparison
     from benchmarks.reproduction.reproduce import run_job
-    from benchmarks.suites.frozen import frozen_suite
     from benchmarks.suites.reproduction import ReproductionSuite
-    from benchmarks.suites.suite import SuiteError
     from pma_gym.data.files.trial_formats import needed
     from pma_gym.terminal import SafeConsole
 
     places = executor_named(executor, jobs)
     if traces == "parquet":
         needed("pyarrow", "--traces parquet")
-    frozen = frozen_suite(suite)
-    folder = out or RESULTS / frozen.name
-    if isinstance(frozen, ReproductionSuite):
-        specs = [entry.spec for entry in chosen(frozen, controllers)]
-        if stations is not None:
-            raise SuiteError(f"suite {frozen.name} has models, no stations; leave --stations out")
-        selected = frozen.select(controllers=specs, tasks=listed(task))
-        code = run_job(selected, folder, places, SafeConsole(), traces or "")
+    part, entries = _selected(suite, controllers, stations, task)
+    folder = out or RESULTS / part.name
+    if isinstance(part, ReproductionSuite):
+        code = run_job(part, folder, places, SafeConsole(), traces or "")
     else:
-        part = frozen.part(stations, listed(task))
-        entries = chosen(part, controllers)
         code = run_comparison(part, entries, folder, places, SafeConsole(), traces or "")
     raise typer.Exit(code)
+
+
+@app.command(epilog="Example: python -m benchmarks record nominal --to parquet --controllers pid")
+def record(
+    suite: Annotated[str, typer.Argument(help="Name, see `suites`, or path of a TOML file.")],
+    to: Annotated[
+        Literal["parquet", "minari"],
+        typer.Option(help="A file an episode, or a Minari data set a task."),
+    ] = "parquet",
+    controllers: Annotated[
+        str, typer.Option(help="Names or path/to/file.py:ClassName, by commas; or all.")
+    ] = "all",
+    jobs: Jobs = 2,
+    out: Annotated[
+        Path | None, typer.Option(help="Folder; results/SUITE/episodes if not given.")
+    ] = None,
+    stations: Annotated[int | None, typer.Option(min=1, help="Only the first ones.")] = None,
+    task: Annotated[str, typer.Option(help="Only these tasks, by commas; all if empty.")] = "",
+) -> None:
+    """Write the controllers' episodes as a data set: observations, actions, rewards, infos."""
+    from benchmarks.runner.case import cases
+    from benchmarks.runner.episodes import record_cases
+
+    part, entries = _selected(suite, controllers, stations, task)
+    folder = out or RESULTS / part.name / "episodes"
+    failed = record_cases(cases(part, tuple(entries)), to, folder, executor_named(LOCAL, jobs))
+    for name, why in failed.items():
+        print(f"{name} failed: {why}")
+    print(f"Episodes: {folder}")
+    raise typer.Exit(1 if failed else 0)
+
+
+def _selected(
+    suite: str, controllers: str, stations: int | None, task: str
+) -> "tuple[FrozenSuite, Sequence[Entry]]":
+    """The part of a suite that options name, and who drives it."""
+    from benchmarks.comparison.job import chosen
+    from benchmarks.suites.frozen import frozen_suite
+    from benchmarks.suites.reproduction import ReproductionSuite
+    from benchmarks.suites.suite import SuiteError
+
+    frozen = frozen_suite(suite)
+    if not isinstance(frozen, ReproductionSuite):
+        part = frozen.part(stations, listed(task))
+        return part, chosen(part, controllers)
+    if stations is not None:
+        raise SuiteError(f"suite {frozen.name} has models, no stations; leave --stations out")
+    specs = [entry.spec for entry in chosen(frozen, controllers)]
+    selected = frozen.select(controllers=specs, tasks=listed(task))
+    return selected, selected.entries
 
 
 @app.command(epilog="Example: python -m benchmarks report robust")

@@ -113,12 +113,7 @@ def drive(case: Case, model: Model | None = None) -> tuple[Rollout, PMAEnv]:
         Exception: whatever the controller or the environment raised.
     """
     suite, spec, episode = case.suite, case.spec, case.episode
-    environment = PMAEnv(
-        task=episode.task,
-        model=model or suite.station(episode.station).model,
-        pressure_kpa=episode.pressure_kpa,
-        **suite.environment,
-    )
+    environment = environment_of(suite, episode, model)
     controller = driver(spec, environment.options.period, suite.keep_pace)
     nominal = nominal_model(environment.task, suite.nominal_of(episode.station))
     seed = suite.seed_of(episode, spec.name)
@@ -126,6 +121,16 @@ def drive(case: Case, model: Model | None = None) -> tuple[Rollout, PMAEnv]:
     if isinstance(controller, Isolated):
         done = replace(done, act_seconds=np.array(controller.act_seconds))
     return done, environment
+
+
+def environment_of(suite: FrozenSuite, episode: Episode, model: Model | None = None) -> PMAEnv:
+    """The environment of a suite's episode; its station is drawn anew if no model is given."""
+    return PMAEnv(
+        task=episode.task,
+        model=model or suite.station(episode.station).model,
+        pressure_kpa=episode.pressure_kpa,
+        **suite.environment,
+    )
 
 
 def _figures(done: Rollout, environment: PMAEnv) -> Row:

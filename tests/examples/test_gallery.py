@@ -10,7 +10,7 @@ from tests.examples.notebooks import EXAMPLES, NOTEBOOKS, notebook
 
 ROOT = EXAMPLES.parents[1]
 # What the examples need beyond the core and controllers.
-LIBRARIES = {"policy_to_onnx": "onnx"}
+LIBRARIES = {"policy_to_onnx": "onnx", "behaviour_cloning": "pyarrow"}
 GALLERY = (
     *("open_and_closed_loop", "pid_from_linear_model", "mpc_with_limits", "many_environments"),
     *(
@@ -24,7 +24,7 @@ GALLERY = (
         "tensile_test",
     ),
     *("cylinder_seal", "band_brake", "antagonistic_pair", "own_effect"),
-    "policy_to_onnx",
+    *("policy_to_onnx", "behaviour_cloning"),
 )
 SECONDS = 400
 
