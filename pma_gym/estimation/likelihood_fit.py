@@ -184,15 +184,7 @@ def fit(
         information += np.diag(weight)
         # What is at an end of its range and drawn beyond it takes no part in the step.
         out = (within(x + STEP * np.sign(gradient)) == x) & (gradient != 0.0)
-        scale = np.sqrt(np.maximum(np.diag(information), 1e-12))
-        normal = information / np.outer(scale, scale)
-        normal[out, :] = normal[:, out] = 0.0
-        steps = []
-        for factor in FACTORS:
-            ridge = (damping * factor + 1e-10) * np.eye(p) + np.diag(out.astype(float))
-            step = np.linalg.solve(normal + ridge, np.where(out, 0.0, gradient) / scale) / scale
-            # Each by itself: what the readings tell nothing of must not hold the others back.
-            steps.append(within(x + np.clip(step, -WIDEST, WIDEST)))
+        steps = [within(x + step) for step in _damped(information, gradient, out, damping)]
         values, _ = valued(steps)
         at = int(np.argmax(values))
         gain = float(values[at]) - best
@@ -203,6 +195,19 @@ def fit(
         if gain < least:
             break
     return Fit(point(x), best, tuple(coordinates), dict(tied), information, scores)
+
+
+def _damped(information: Array, gradient: Array, out: Array, damping: float) -> list[Array]:
+    """Steps of all damping factors, shape (p,) each; what is out takes no part."""
+    scale = np.sqrt(np.maximum(np.diag(information), 1e-12))
+    normal, steps = information / np.outer(scale, scale), []
+    normal[out, :] = normal[:, out] = 0.0
+    for factor in FACTORS:
+        ridge = (damping * factor + 1e-10) * np.eye(len(scale)) + np.diag(out.astype(float))
+        step = np.linalg.solve(normal + ridge, np.where(out, 0.0, gradient) / scale) / scale
+        # Each by itself: what the readings tell nothing of must not hold the others back.
+        steps.append(np.clip(step, -WIDEST, WIDEST))
+    return steps
 
 
 def _scored(
