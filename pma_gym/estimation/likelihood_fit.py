@@ -197,7 +197,9 @@ def fit(
     return Fit(point(x), best, tuple(coordinates), dict(tied), information, scores)
 
 
-def _damped(information: Array, gradient: Array, out: Array, damping: float) -> list[Array]:
+def _damped(
+    information: Array, gradient: Array, out: NDArray[np.bool_], damping: float
+) -> list[Array]:
     """Steps of all damping factors, shape (p,) each; what is out takes no part."""
     scale = np.sqrt(np.maximum(np.diag(information), 1e-12))
     normal, steps = information / np.outer(scale, scale), []
