@@ -151,7 +151,7 @@ archive: ## Pack suites, tables and figures for Zenodo, with SHA256SUMS, into di
 	rm -rf build/$(DATA) && mkdir -p build/$(DATA) dist
 	git ls-files $(ARCHIVED) | grep -v '[.]py$$' | xargs cp --parents -t build/$(DATA)
 	cd build/$(DATA) && find . -type f | sort | xargs sha256sum > ../SHA256SUMS && mv ../SHA256SUMS .
-	tar -C build --sort=name --owner=0 --group=0 --mtime=@0 -c $(DATA) | gzip -n > dist/$(DATA).tar.gz
+	tar -C build --sort=name --owner=0 --group=0 --mode=u=rwX,go=rX --mtime=@0 -c $(DATA) | gzip -n > dist/$(DATA).tar.gz
 
 clean: ## Remove what the tools generated, but no environment (.venv, .peers...) and not results/.
 	rm -rf build dist site *.egg-info .pytest_cache .ruff_cache .hypothesis .import_linter_cache

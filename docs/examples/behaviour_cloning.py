@@ -1,6 +1,6 @@
 """Offline learning: a policy that imitates the PID, from recorded episodes alone."""
 
-# %% Record the PID's episodes at nine pressures, a Parquet file each.
+# %% Record five episodes of the PID at each of nine pressures, a Parquet file each.
 import subprocess
 import sys
 from pathlib import Path
