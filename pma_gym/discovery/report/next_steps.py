@@ -21,12 +21,15 @@ def what_to_do(diagnosis: Diagnosis) -> list[str]:
 
 def _use_effect(diagnosis: Diagnosis) -> list[str]:
     steps = ["Use the amended model, `model.toml` beside this page"]
-    # The environments' tasks are a muscle's.
-    steps[0] += (
-        ': `gym.make("pma_gym/IsokineticDisplacement-v0", model="model.toml")`.'
-        if diagnosis.model.rig.balances_loads
-        else ': `Plant(load_model("model.toml")).simulate(trial)`.'
-    )
+    rig = diagnosis.model.rig
+    if rig.balances_loads:
+        steps[0] += ': `gym.make("pma_gym/IsokineticDisplacement-v0", model="model.toml")`.'
+    elif rig.is_free:
+        steps[0] += (
+            ': `RigEnv(model="model.toml")`; `python -m benchmarks from-logs LOGS` tunes for it.'
+        )
+    else:
+        steps[0] += ': `Plant(load_model("model.toml")).simulate(trial)`.'
     for effect in diagnosis.effects:
         if effect.confused_with:
             rivals = effect_names(effect.confused_with, "or")
@@ -64,6 +67,12 @@ def _describe(diagnosis: Diagnosis) -> list[str]:
         "loose frame, a hose, a supply, the mains beyond half the sampling rate."
         for signal, hertz in diagnosis.tones.items()
     ]
+    if diagnosis.law is None:
+        return [
+            *steps,
+            "Log at rest, repeat a trial, check the clock and look for play: what changes tells "
+            "where it comes from.",
+        ]
     return [
         *steps,
         "Write it as a user effect, one Python file, and diagnose again with `--effect FILE.py`.",

@@ -133,6 +133,8 @@ def _handles(diagnosis: Diagnosis) -> list[Line2D]:
 
 def after_name(diagnosis: Diagnosis) -> str:
     """What to call the model that the diagnosis ends with."""
+    if diagnosis.verdict == "unknown" and diagnosis.approximate:
+        return "best candidate"
     return "effect added" if diagnosis.effects else "model proposed"
 
 
