@@ -12,6 +12,7 @@ from pma_gym import Plant, Trial
 from pma_gym.data.files.trial_files import write_trial
 from pma_gym.envs import RigEnv
 from pma_gym.plant.model import dump_model, parse_model
+from tests.envs.test_rig import SLIDE
 
 HEAD = {"schema": 1, "name": "arm", "title": "a rig of a test"}
 JOINT = parse_model(
@@ -24,16 +25,6 @@ JOINT = parse_model(
         "inertia": {"inertia_kg_m2": 0.0049},
         "joint_start": {"angle_deg": 0.0, "spin_deg_per_s": 0.0},
         "encoder": {"bandwidth_hz": 500, "noise_deg": 0.02},
-    }
-)
-SLIDE = parse_model(
-    HEAD
-    | {
-        "plant": "slide",
-        "two_way_drive": {"gain_n_per_v": 20, "middle_v": 5},
-        "slide": {"mass_kg": 2.0},
-        "start": {"contraction_mm": 5.0, "velocity_mm_per_s": 0.0},
-        "lvdt": {"bandwidth_hz": 300, "noise_mm": 0.02},
     }
 )
 RIGS = {
