@@ -40,8 +40,8 @@ TREND, TRIAL = "~", "@"
 `slot~` is its change from trial to trial, `slot@2` its value in trial 2.
 """
 
-FIRST_ROWS = 8
-"""Readings that a first speed is taken from."""
+FIRST_ROWS, FIRST_BLOCKS = 8, 80
+"""Readings that a first speed is taken from, and blocks of rows among which they are looked for."""
 
 
 class LatentForce(NamedTuple):
@@ -160,6 +160,8 @@ class Rows:
         coarse: for each signal, whether its steps are coarser than its noise. A dwell in one step
             counts as two readings then, the first and the last: those between tell nothing new, and
             hundreds of them would outweigh all that moves.
+        extrapolated: whether a filter runs with twice the steps too, and what comes out is
+            extrapolated to none.
     """
 
     def __init__(
@@ -171,7 +173,10 @@ class Rows:
         block: int,
         stride: int = 1,
         coarse: Sequence[bool] = (),
+        extrapolated: bool = False,
     ) -> None:
+        finer = logged, channels, 2 * steps, linear, block, stride, coarse
+        self.finer = Rows(*finer) if extrapolated else None
         self.steps = steps
         starts = np.arange(0, len(logged.time), block)
         self.sizes = np.diff(np.append(starts, len(logged.time)))
@@ -182,6 +187,7 @@ class Rows:
             total = np.add.reduceat(logged.measured[channel] * logged.counts[channel], starts)
             self.readings[:, i, 0] = total / np.maximum(counts, 1.0)
             self.readings[:, i, 1] = counts == self.sizes
+        self._opening = self.time[:FIRST_BLOCKS], self.readings[:FIRST_BLOCKS].copy()
         self.time, self.readings = (
             self.time[::stride],
             np.ascontiguousarray(self.readings[::stride]),
@@ -238,14 +244,15 @@ class Rows:
 
     def _first(self, position: int | None, speed: int | None) -> tuple[float, float, float]:
         first, motion, spread = 0.0, 0.0, 0.0
+        time, readings = self._opening
         if position is not None:
-            there = np.flatnonzero(self.there[:, position])[:FIRST_ROWS]
-            y, t = self.readings[there, position, 0], self.time[there]
+            there = np.flatnonzero(readings[:, position, 1])[:FIRST_ROWS]
+            y, t = readings[there, position, 0], time[there]
             first, motion = float(y[0]), float(np.polyfit(t - t[0], y, 1)[0])
             spread = (float(np.ptp(y)) + 1e-12) / (t[-1] - t[0])
         if speed is not None:
-            there = np.flatnonzero(self.there[:, speed])[:FIRST_ROWS]
-            y = self.readings[there, speed, 0]
+            there = np.flatnonzero(readings[:, speed, 1])[:FIRST_ROWS]
+            y = readings[there, speed, 0]
             motion, spread = float(y[0]), float(np.std(y)) + 1e-12
         return first, motion, spread
 
@@ -310,7 +317,10 @@ class GreyBox:
         def part(number: int, first: int) -> None:
             some = list(points[first : first + width])
             filled = some + [some[-1]] * (width - len(some))
-            out = self._run(self.kernel, number, trials[number], filled)
+            trial = trials[number]
+            out = self._run(self.kernel, number, trial, filled)
+            if trial.finer is not None:
+                out = _extrapolated(out, self._run(self.kernel, number, trial.finer, filled))
             for i, into in enumerate(results[number]):
                 into[first : first + width] = np.moveaxis(out[:, :, i, : len(some)], -1, 0)
 
@@ -322,7 +332,7 @@ class GreyBox:
     def kept(self, number: int, point: Point) -> Kept:
         """Means, covariances and transitions of one trial."""
         k = kernel(self.model, self.channels, keeps=True)
-        n, s, trial = len(k.states), k.size, self.rows[number]
+        n, s, trial = len(k.states), k.size, self.rows[number].finer or self.rows[number]
         room = np.empty((len(trial.time), 2 * s + n * n))
         self._run(k, number, trial, [point], room)
         lower = np.tril_indices(n)
@@ -431,7 +441,19 @@ def counted(rows: Rows, counts: NDArray[np.bool_]) -> Rows:
     other = copy(rows)
     other.readings = rows.readings.copy()
     other.readings[:, :, 1] *= counts[:, None]
+    other.finer = rows.finer and counted(rows.finer, counts)
     return other
+
+
+def _extrapolated(coarse: Array, fine: Array) -> Array:
+    """Innovations and variances in the limit of short steps, of a method of order 2 (Richardson).
+
+    A variance by its logarithm, so that it stays above none.
+    """
+    with np.errstate(all="ignore"):
+        errors = fine[:, :, 0] + (fine[:, :, 0] - coarse[:, :, 0]) / 3.0
+        spreads = fine[:, :, 1] * np.cbrt(fine[:, :, 1] / coarse[:, :, 1])
+    return np.stack([errors, spreads], axis=2)
 
 
 def predictions(box: GreyBox, point: Point, horizon: float) -> list[Array]:

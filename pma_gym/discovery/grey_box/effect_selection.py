@@ -54,14 +54,15 @@ Times the size that the screening promises, shares of the latent force, and time
 presliding distance.
 """
 
-FITTED, FURTHER = 2, 4
+FITTED, FURTHER = 1, 2
 """How many of them are fitted, the likeliest as they are, and in a careful fit."""
 
-SUBSTEP_S, ROUGH_SUBSTEP_S = 1e-3, 3e-4
-"""Longest integration step, without and with dry friction."""
+PRECISE, MOST_STEPS = 1.0, 200_000
+"""Integration steps are halved until that changes all innovations by less.
 
-MOST_STEPS = 150_000
-"""Of all trials together; longer steps where they would take more."""
+Sum of their squares, in their deviations, so that log likelihoods are right to about one unit. And
+steps of all trials together at most, of which the finer half has twice as many.
+"""
 
 MOST_ROWS = 8_000
 """Of all trials together.
@@ -99,6 +100,9 @@ SHARES = (0.1, 0.01, 0.03, 0.003)
 
 Small, so that it swallows nothing at first.
 """
+
+LEAST_FORCE = 1e-6
+"""Least latent force, as a share of the drive's."""
 
 WIDE = 5.0
 """Standard deviation of the own parameters' priors.
@@ -214,11 +218,7 @@ class EffectSelection:
         self.block = self._block(readings)
         total = sum(len(each.time) for each in logged) / self.block
         self.stride = max(1, int(total / MOST_ROWS))
-        seconds = sum(float(each.time[-1] - each.time[0]) for each in logged)
-        self.substeps = {
-            rough: max(h, seconds / MOST_STEPS)
-            for rough, h in ((False, SUBSTEP_S), (True, ROUGH_SUBSTEP_S))
-        }
+        self.steps = max(1, self.stride * self.block // 8)
         self.span = (
             self.stride
             * self.block
@@ -245,17 +245,40 @@ class EffectSelection:
             block = wider
         return block
 
-    def box(self, model: Model, linear: bool | None = None, steps: int = 2) -> GreyBox:
-        """The filter of a model over the trials, with so many integration steps a row at least."""
-        steps = max(steps, int(np.ceil(self.span / self.substeps[is_rough(model)])))
+    def box(self, model: Model, linear: bool | None = None, steps: int = 0) -> GreyBox:
+        """The filter of a model over the trials, with so many integration steps a row."""
+        steps = steps or self.steps
         linear = bool(self.linear if linear is None else linear)
         if (steps, linear) not in self._rows:
             each = [
-                Rows(one, self.channels, steps, linear, self.block, self.stride, self.coarse)
+                Rows(one, self.channels, steps, linear, self.block, self.stride, self.coarse, True)
                 for one in self.logged
             ]
             self._rows[steps, linear] = each
         return GreyBox(model, self._rows[steps, linear], self.channels, self.threads)
+
+    def precise(
+        self, model: Model, point: Point, steps: int = 0, linear: bool | None = None
+    ) -> GreyBox:
+        """The filter of a model with as many steps as it needs at a point, at least so many.
+
+        Beside next to no latent force: what it makes uncertain needs less.
+        """
+        rows, steps = self.stride * self.block, steps or self.steps
+        point = replace(point, forces=(LEAST_FORCE * self.force,) * len(self.logged))
+        total = sum(float(each.time[-1] - each.time[0]) for each in self.logged)
+        most = MOST_STEPS * self.span / total
+        box = self.box(model, linear, steps)
+        white = self.white(box, [point])
+        while 2 * steps <= most:
+            # Where several rows are one step, the next has each by itself.
+            steps = rows if steps < rows < 2 * steps else 2 * steps
+            finer = self.box(model, linear, steps)
+            before, white = white, self.white(finer, [point])
+            if np.sum((white - before) ** 2) < PRECISE:
+                break
+            box = finer
+        return box
 
     def _force(self) -> float:
         """Force of the drive (N, N m) at the root mean square of its command."""
@@ -317,7 +340,7 @@ class EffectSelection:
             for i, (n, s) in enumerate(pairs)
         ]
         forces = [
-            Coordinate(f"force {i}", 1.0, True, 1e-6 * self.force, 10.0 * self.force)
+            Coordinate(f"force {i}", 1.0, True, LEAST_FORCE * self.force, 10.0 * self.force)
             for i in range(len(self.logged))
         ]
         least, most = self.memory
@@ -334,6 +357,9 @@ class EffectSelection:
         count = STARTS if rough else SMOOTH_STARTS
         kinds: Sequence[bool] = (False, True) if self.linear is None else (self.linear,)
         fits: dict[bool, list[Fit]] = {linear: [] for linear in kinds}
+        first = self._begin(self.box(self.model, False), coordinates, tied, 0, -1)
+        boxes = [self.precise(self.model, first, linear=linear) for linear in kinds]
+        self.steps = max(box.rows[0].steps for box in boxes)
 
         def start(k: int, odd: int) -> None:
             for linear in kinds:
@@ -353,9 +379,7 @@ class EffectSelection:
         if rough and len(fits) > 1:
             best = max(fits[self.linear], key=lambda each: each.value)
             for linear in fits:
-                fits[linear] += self.hold_fits(
-                    best, self.model, linear, self.box(self.model).rows[0].steps
-                )
+                fits[linear] += self.hold_fits(best, self.model, linear, self.steps)
             self.linear = max(fits, key=lambda each: max(f.value for f in fits[each]))
         forces = max(fits[self.linear], key=lambda each: each.value).point.forces
         if (
@@ -543,13 +567,12 @@ class EffectSelection:
         more += [_presliding(candidate.effect)] if "presliding" in law.scanned else []
         here = move.start or now.fit.point
         whole = replace(here, numbers={**box.numbers(), **here.numbers})
-        best = None
-        for start in self._starts(box, whole, at, absent, more, tied)[FITTED * careful :][
-            : FURTHER if careful else FITTED
-        ]:
+        best, starts = None, self._starts(box, whole, at, absent, more, tied)
+        box = self.precise(box.model, starts[0], now.box.rows[0].steps)
+        for start in starts[FITTED:][:FURTHER] if careful else starts[:FITTED]:
             made = fit(box, start, [*now.fit.coordinates, *more], tied)
             best = made if best is None or made.value > best.value else best
-        if not careful:
+        if best is None or best.value < now.fit.value:
             # From none of it, a fit is no less likely than without.
             none = with_values(whole, with_tied({**at, **absent}, tied))
             made = fit(box, none, [*now.fit.coordinates, *more], tied, rough=True)
@@ -742,7 +765,7 @@ class EffectSelection:
         for sooner in (1.0, 0.1) if is_rough(model) else (1.0,):
             slip = {n: sooner * v for n, v in point.numbers.items() if n.endswith(".presliding")}
             start = with_values(point, {**slip, "delay": max(0.0, point.delay + row * late)})
-            fits.append(fit(box, start, best.coordinates, best.tied))
+            fits.append(fit(box, start, best.coordinates, best.tied, rough=True))
         return fits
 
     def _other_hold(self, now: Hypothesis) -> Hypothesis:
@@ -793,16 +816,9 @@ class EffectSelection:
             for c in now.fit.coordinates
             if c.name in shared
         }
-        box, tied = self.box(now.box.model, steps=larger.box.rows[0].steps), now.fit.tied
-        made = [
-            fit(box, with_values(now.fit.point, with_tied(values, tied)), now.fit.coordinates, tied)
-        ]
-        made += (
-            [fit(box, now.fit.point, now.fit.coordinates, tied)]
-            if box.rows is not now.box.rows
-            else [now.fit]
-        )
-        return replace(now, box=box, fit=max(made, key=lambda each: each.value))
+        start = with_values(now.fit.point, with_tied(values, now.fit.tied))
+        made = fit(now.box, start, now.fit.coordinates, now.fit.tied)
+        return replace(now, fit=max(made, now.fit, key=lambda each: each.value))
 
     def price(self, one: Hypothesis, other: Hypothesis) -> float:
         """Log likelihood that a larger hypothesis must gain over a smaller.
