@@ -57,11 +57,12 @@ presliding distance.
 FITTED, FURTHER = 1, 2
 """How many of them are fitted, the likeliest as they are, and in a careful fit."""
 
-PRECISE, MOST_STEPS = 1.0, 200_000
+PRECISE, MOST_STEPS, SHORTEST_S = 1.0, 200_000, 1e-4
 """Integration steps are halved until that changes all innovations by less.
 
 Sum of their squares, in their deviations, so that log likelihoods are right to about one unit. And
-steps of all trials together at most, of which the finer half has twice as many.
+steps of all trials together at most, and the shortest step: where friction turns, no step is short
+enough for such precision.
 """
 
 MOST_ROWS = 8_000
@@ -267,7 +268,7 @@ class EffectSelection:
         rows, steps = self.stride * self.block, steps or self.steps
         point = replace(point, forces=(LEAST_FORCE * self.force,) * len(self.logged))
         total = sum(float(each.time[-1] - each.time[0]) for each in self.logged)
-        most = MOST_STEPS * self.span / total
+        most = min(MOST_STEPS * self.span / total, 0.5 * self.span / SHORTEST_S)
         box = self.box(model, linear, steps)
         white = self.white(box, [point])
         while 2 * steps <= most:
