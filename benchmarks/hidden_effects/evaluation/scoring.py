@@ -159,6 +159,8 @@ def _missed(outcome: Outcome) -> bool:
     """Whether a case is one that the block's target speaks against."""
     if not outcome.answered:
         return True
+    if outcome.trouble:
+        return outcome.trouble not in ("said", "quiet")
     if outcome.kind == "outside":
         return outcome.verdict != "unknown"
     if outcome.block == "rigs" and outcome.truth:

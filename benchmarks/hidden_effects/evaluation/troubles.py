@@ -1,0 +1,126 @@
+"""Answers to cases of blocks `lab` and `lab_nothing`: what counts as naming a trouble.
+
+A trouble is said where the answer names it, or says its place and kind: which trial alone has how
+much more friction, by what share the gain falls from trial to trial, at what frequency a sensor
+hums. An effect that is named for sure and is another is wrong, also beside the right one; so is a
+claim about trials that differ, where they do not so. A list of all that could be wrong says
+nothing: words count only where they are those of one trouble.
+"""
+
+import json
+import re
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+RIGHT_STRUCTURE = ("agrees", "parameters")
+"""Verdicts that say that no structure is missing."""
+
+NAMES: dict[str, str] = {
+    "clock": r"(.*_)?clock(_.*)?",
+    "bent_sensor": r"(.*_)?(bend|bent_sensor|nonlinearity|linearity)",
+    "play": r"(.*_)?(backlash|play|lost_motion)",
+    "dead_band": r"drive_dead_(zone|band)",
+    "hum": r"(.*_)?(hum|mains)",
+}
+"""Patterns of an effect's name by the trouble that it is; the other troubles are no effect."""
+
+SENSOR = r"\b(sensor|reading|readings|lvdt|encoder|contraction|angle)\b"
+"""Words for the place of what is wrong with a reading."""
+
+WORDS: dict[str, tuple[str, ...]] = {
+    "clock": (r"\bclocks?\b",),
+    "bent_sensor": (SENSOR, r"\b(bent|bends|nonlinear|not linear)\b"),
+    "play": (r"\b(play|backlash|lost motion)\b",),
+    "dead_band": (r"\bdrive\b", r"\bdead (band|zone)\b"),
+    "hum": (SENSOR, r"\b(hum|hums|mains|ripple|oscillates)\b"),
+}
+"""Words of place and kind, all of which say a trouble."""
+
+ALONE = re.compile(r"(\S+) alone needs (\S+) (-?[\d.e+-]+)")
+TREND = re.compile(r"(\S+) (falls|rises) by ([\d.]+) % from trial to trial")
+SHARE = re.compile(r"([\d.]+) % of it acts in (\S+?)\.? ")
+CANDIDATE = re.compile(r"Best candidate: (.+?), which leaves")
+"""Sentences about trials, and about what comes nearest where nothing is named."""
+
+MOSTLY = 80.0
+"""Share of what is unknown that is in one trial, so that it counts as that trial's (%)."""
+
+SIZE, GAIN, FREQUENCY = 0.2, 0.3, 0.02
+"""Relative errors at most: of friction, of a share of the gain, of a frequency."""
+
+ROUNDING = 0.5
+"""Of a share that is printed in whole per cents."""
+
+
+def judged(truth: Mapping[str, Any], answer: Mapping[str, Any], effects: Sequence[str]) -> str:
+    """ "said", "wrong" or "missed"; of a case without a trouble "alarm" or "quiet".
+
+    Args:
+        truth: of the case.
+        answer: its `diagnosis.json`.
+        effects: names that it says for sure, besides what is true of the rig.
+    """
+    name, sentence = truth["trouble"]["name"], answer["sentence"]
+    differ = bool(ALONE.search(sentence) or TREND.search(sentence))
+    if name == "nothing":
+        return "alarm" if effects or differ or answer["verdict"] == "unknown" else "quiet"
+    if effects and not all(_is_name(name, each) for each in effects):
+        return "wrong"
+    if differ:
+        return "said" if _of_trials(truth, sentence) else "wrong"
+    return "said" if effects or _said(truth, answer) else "missed"
+
+
+def _is_name(trouble: str, name: str) -> bool:
+    return bool(re.fullmatch(NAMES.get(trouble, "(?!)"), name.replace(" ", "_")))
+
+
+def _of_trials(truth: Mapping[str, Any], sentence: str) -> bool:
+    """Whether every claim about trials is that of the trouble, of its size."""
+    trouble, friction = truth["trouble"], truth["friction"]["true"]
+    alone = [
+        trouble["name"] == "one_trial"
+        and file == trouble["trial"]
+        and "friction." in path
+        and _near(float(value), friction * (1.0 + trouble["size"]), SIZE)
+        for file, path, value in ALONE.findall(sentence)
+    ]
+    trends = [
+        trouble["name"] == "gain_drift"
+        and path.split(".")[-1].startswith("gain")
+        and way == "falls"
+        and abs(float(share) - 100.0 * trouble["size"]) <= 100.0 * trouble["size"] * GAIN + ROUNDING
+        for path, way, share in TREND.findall(sentence)
+    ]
+    return all([*alone, *trends])
+
+
+def _said(truth: Mapping[str, Any], answer: Mapping[str, Any]) -> bool:
+    """Whether an answer that names no effect says place and kind."""
+    trouble, sentence = truth["trouble"], answer["sentence"]
+    name, verdict = trouble["name"], answer["verdict"]
+    if name == "in_motion":
+        begins = verdict == "undecidable" and re.search(r"\b(rest|in motion)\b", sentence)
+        return verdict in RIGHT_STRUCTURE or bool(begins)
+    candidate = CANDIDATE.search(sentence)
+    nearest = re.split(r", | and ", candidate[1]) if candidate else []
+    if name == "one_trial":
+        shares = [float(x) for x, file in SHARE.findall(sentence) if file == trouble["trial"]]
+        return max(shares, default=0.0) >= MOSTLY and any(x.endswith("friction") for x in nearest)
+    words = [name for name in WORDS if _has(WORDS[name], sentence)]
+    if name == "hum":
+        heard = json.dumps([answer.get("tones"), answer.get("nuisances"), sentence])
+        numbers = [float(x) for x in re.findall(r"\d+(?:\.\d+)?(?=[^\d.])", heard)]
+        at = any(_near(x, trouble["seen_hz"], FREQUENCY) for x in numbers)
+        tone = bool(answer.get("tones") or answer.get("nuisances"))
+        return at and (tone or words == ["hum"])
+    alone = bool(nearest) and all(_is_name(name, each) for each in nearest)
+    return words == [name] or alone
+
+
+def _has(patterns: Sequence[str], sentence: str) -> bool:
+    return all(re.search(each, sentence, re.IGNORECASE) for each in patterns)
+
+
+def _near(value: float, truth: float, share: float) -> bool:
+    return abs(value - truth) <= share * abs(truth)
