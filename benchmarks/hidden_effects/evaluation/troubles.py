@@ -53,7 +53,7 @@ ROUNDING = 0.5
 
 
 def judged(truth: Mapping[str, Any], answer: Mapping[str, Any], effects: Sequence[str]) -> str:
-    """ "said", "wrong" or "missed"; of a case without a trouble "alarm" or "quiet".
+    """Say "said", "wrong" or "missed"; of a case without a trouble "alarm" or "quiet".
 
     Args:
         truth: of the case.

@@ -97,9 +97,7 @@ def truth(name):
     }
 
 
-ALONE = (
-    "Trials differ: {} alone needs coulomb_friction.static_n {} N (95 %: 9 to 11) instead of 9.8."
-)
+ALONE = "Trials differ: {} alone needs coulomb_friction.static_n {} N (95 %: 9 to 11)."
 FALLS = "Trials differ: two_way_drive.gain_n_per_v falls by {} % from trial to trial (-2 N/V)."
 
 
