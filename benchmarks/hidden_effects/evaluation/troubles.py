@@ -109,11 +109,11 @@ def _said(truth: Mapping[str, Any], answer: Mapping[str, Any]) -> bool:
         return max(shares, default=0.0) >= MOSTLY and any(x.endswith("friction") for x in nearest)
     words = [name for name in WORDS if _has(WORDS[name], sentence)]
     if name == "hum":
-        heard = json.dumps([answer.get("tones"), answer.get("nuisances"), sentence])
-        numbers = [float(x) for x in re.findall(r"\d+(?:\.\d+)?(?=[^\d.])", heard)]
-        at = any(_near(x, trouble["seen_hz"], FREQUENCY) for x in numbers)
-        tone = bool(answer.get("tones") or answer.get("nuisances"))
-        return at and (tone or words == ["hum"])
+        listed = json.dumps([answer.get("tones"), answer.get("nuisances")])
+        spoken = re.findall(r"(\d+(?:\.\d+)?) Hz", sentence) if words == [name] else []
+        heard = map(float, [*re.findall(r"\d+(?:\.\d+)?", listed), *spoken])
+        true = trouble["mains"], trouble["seen_hz"]
+        return any(_near(x, each, FREQUENCY) for x in heard for each in true)
     alone = bool(nearest) and all(_is_name(name, each) for each in nearest)
     return words == [name] or alone
 
