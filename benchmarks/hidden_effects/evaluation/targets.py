@@ -151,6 +151,7 @@ _RIGS = (
 
 _LAB = (
     Rate("trouble named, or place and kind said", lambda o: o.trouble == "said", Target(0.75)),
+    Rate("... or with other claims beside it", lambda o: o.trouble in ("said", "beside")),
     Rate("confidently wrong", lambda o: o.wrong),
     Rate("detected", lambda o: o.detected),
     *(Rate(f"{name}: said", _of(name, lambda o: o.trouble == "said")) for name in SIZES),

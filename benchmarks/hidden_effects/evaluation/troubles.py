@@ -38,7 +38,7 @@ WORDS: dict[str, tuple[str, ...]] = {
 
 ALONE = re.compile(r"(\S+) alone needs (\S+) (-?[\d.e+-]+)")
 TREND = re.compile(r"(\S+) (falls|rises) by ([\d.]+) % from trial to trial")
-SHARE = re.compile(r"([\d.]+) % of it acts in (\S+?)\.? ")
+SHARE = re.compile(r"([\d.]+) % of it acts in (\S+?)\.?(?: |$)")
 CANDIDATE = re.compile(r"Best candidate: (.+?), which leaves")
 """Sentences about trials, and about what comes nearest where nothing is named."""
 
@@ -53,7 +53,9 @@ ROUNDING = 0.5
 
 
 def judged(truth: Mapping[str, Any], answer: Mapping[str, Any], effects: Sequence[str]) -> str:
-    """Say "said", "wrong" or "missed"; of a case without a trouble "alarm" or "quiet".
+    """Say "said", "beside", "wrong" or "missed"; of a case without a trouble "alarm" or "quiet".
+
+    "beside" is the trouble with other claims beside it.
 
     Args:
         truth: of the case.
@@ -61,22 +63,20 @@ def judged(truth: Mapping[str, Any], answer: Mapping[str, Any], effects: Sequenc
         effects: names that it says for sure, besides what is true of the rig.
     """
     name, sentence = truth["trouble"]["name"], answer["sentence"]
-    differ = bool(ALONE.search(sentence) or TREND.search(sentence))
+    claims = [*(_is_name(name, each) for each in effects), *_of_trials(truth, sentence)]
     if name == "nothing":
-        return "alarm" if effects or differ or answer["verdict"] == "unknown" else "quiet"
-    if effects and not all(_is_name(name, each) for each in effects):
-        return "wrong"
-    if differ:
-        return "said" if _of_trials(truth, sentence) else "wrong"
-    return "said" if effects or _said(truth, answer) else "missed"
+        return "alarm" if claims or answer["verdict"] == "unknown" else "quiet"
+    if claims:
+        return "said" if all(claims) else "beside" if any(claims) else "wrong"
+    return "said" if _said(truth, answer) else "missed"
 
 
 def _is_name(trouble: str, name: str) -> bool:
     return bool(re.fullmatch(NAMES.get(trouble, "(?!)"), name.replace(" ", "_")))
 
 
-def _of_trials(truth: Mapping[str, Any], sentence: str) -> bool:
-    """Whether every claim about trials is that of the trouble, of its size."""
+def _of_trials(truth: Mapping[str, Any], sentence: str) -> list[bool]:
+    """Whether claims about trials are that of the trouble, of its size, each."""
     trouble, friction = truth["trouble"], truth["friction"]["true"]
     alone = [
         trouble["name"] == "one_trial"
@@ -92,7 +92,8 @@ def _of_trials(truth: Mapping[str, Any], sentence: str) -> bool:
         and abs(float(share) - 100.0 * trouble["size"]) <= 100.0 * trouble["size"] * GAIN + ROUNDING
         for path, way, share in TREND.findall(sentence)
     ]
-    return all([*alone, *trends])
+    # A claim in other words is none of these troubles.
+    return [*alone, *trends] or [False] * ("Trials differ" in sentence)
 
 
 def _said(truth: Mapping[str, Any], answer: Mapping[str, Any]) -> bool:
@@ -106,14 +107,15 @@ def _said(truth: Mapping[str, Any], answer: Mapping[str, Any]) -> bool:
     nearest = re.split(r", | and ", candidate[1]) if candidate else []
     if name == "one_trial":
         shares = [float(x) for x, file in SHARE.findall(sentence) if file == trouble["trial"]]
-        return max(shares, default=0.0) >= MOSTLY and any(x.endswith("friction") for x in nearest)
+        rubs = "goes with speed" in sentence or any(x.endswith("friction") for x in nearest)
+        return max(shares, default=0.0) >= MOSTLY and rubs
     words = [name for name in WORDS if _has(WORDS[name], sentence)]
     if name == "hum":
         listed = json.dumps([answer.get("tones"), answer.get("nuisances")])
         spoken = re.findall(r"(\d+(?:\.\d+)?) Hz", sentence) if words == [name] else []
-        heard = map(float, [*re.findall(r"\d+(?:\.\d+)?", listed), *spoken])
+        numbers = map(float, [*re.findall(r"\d+(?:\.\d+)?", listed), *spoken])
         true = trouble["mains"], trouble["seen_hz"]
-        return any(_near(x, each, FREQUENCY) for x in heard for each in true)
+        return any(_near(x, each, FREQUENCY) for x in numbers for each in true)
     alone = bool(nearest) and all(_is_name(name, each) for each in nearest)
     return words == [name] or alone
 

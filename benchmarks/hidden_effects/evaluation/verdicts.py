@@ -184,7 +184,7 @@ def compare(truth: Mapping[str, Any], answer: Mapping[str, Any]) -> Outcome:
     if "trouble" in truth:
         outcome.trouble = judged(truth, answer, named)
         outcome.truth = (outcome.kind,) if outcome.kind != "nothing" else ()
-        outcome.wrong = outcome.trouble == "wrong"
+        outcome.wrong = outcome.trouble in ("wrong", "beside")
     return outcome
 
 
