@@ -94,7 +94,13 @@ ALONE, FALLS = (
         ("one_trial", "parameters", [], ALONE.format("run_03.csv", 14.0), "wrong"),
         ("one_trial", "parameters", [], ALONE.format("run_02.csv", 10.0), "wrong"),
         ("one_trial", "effect", ["drive_lag"], ALONE.format("run_03.csv", 10.0), "beside"),
-        ("one_trial", "unknown", [], "It goes with speed; 90 % of it acts in run_03.csv.", "said"),
+        (
+            "one_trial",
+            "unknown",
+            [],
+            "It goes with velocity; 90 % of it acts in run_03.csv.",
+            "said",
+        ),
         (
             "one_trial",
             "unknown",
