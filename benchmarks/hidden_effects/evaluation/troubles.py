@@ -107,7 +107,7 @@ def _said(truth: Mapping[str, Any], answer: Mapping[str, Any]) -> bool:
     nearest = re.split(r", | and ", candidate[1]) if candidate else []
     if name == "one_trial":
         shares = [float(x) for x, file in SHARE.findall(sentence) if file == trouble["trial"]]
-        moves = bool(re.search("goes with (speed|velocity)", sentence))
+        moves = bool(re.search("goes with (speed|velocity)", sentence, re.IGNORECASE))
         rubs = moves or any(each.endswith("friction") for each in nearest)
         return max(shares, default=0.0) >= MOSTLY and rubs
     words = [name for name in WORDS if _has(WORDS[name], sentence)]
