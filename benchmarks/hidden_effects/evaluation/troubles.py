@@ -28,7 +28,7 @@ SENSOR = r"\b(sensor|reading|readings|lvdt|encoder|contraction|angle)\b"
 """Words for the place of what is wrong with a reading."""
 
 WORDS: dict[str, tuple[str, ...]] = {
-    "clock": (r"\bclocks?\b",),
+    "clock": (r"\bclocks?\b", r"\b(fast|slow|drifts)\b"),
     "bent_sensor": (SENSOR, r"\b(bent|bends|nonlinear|not linear)\b"),
     "play": (r"\b(play|backlash|lost motion)\b",),
     "dead_band": (r"\bdrive\b", r"\bdead (band|zone)\b"),
@@ -37,7 +37,7 @@ WORDS: dict[str, tuple[str, ...]] = {
 """Words of place and kind, all of which say a trouble."""
 
 ALONE = re.compile(r"(\S+) alone needs (\S+) (-?[\d.e+-]+)")
-TREND = re.compile(r"(\S+) (falls|rises) by ([\d.]+) % from trial to trial")
+TREND = re.compile(r"(\S+) (falls|rises) by (?:< )?([\d.]+) % from trial to trial")
 SHARE = re.compile(r"([\d.]+) % of it acts in (\S+?)\.?(?: |$)")
 CANDIDATE = re.compile(r"Best candidate: (.+?), which leaves")
 """Sentences about trials, and about what comes nearest where nothing is named."""
@@ -101,8 +101,8 @@ def _said(truth: Mapping[str, Any], answer: Mapping[str, Any]) -> bool:
     trouble, sentence = truth["trouble"], answer["sentence"]
     name, verdict = trouble["name"], answer["verdict"]
     if name == "in_motion":
-        begins = verdict == "undecidable" and re.search(r"\b(rest|in motion)\b", sentence)
-        return verdict in RIGHT_STRUCTURE or bool(begins)
+        begins = _has((r"\bbegins? (at rest|in motion)\b",), sentence)
+        return verdict in RIGHT_STRUCTURE or (verdict == "undecidable" and begins)
     candidate = CANDIDATE.search(sentence)
     nearest = re.split(r", | and ", candidate[1]) if candidate else []
     if name == "one_trial":
