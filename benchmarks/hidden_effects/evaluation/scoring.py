@@ -185,9 +185,10 @@ def _said(outcome: Outcome) -> str:
 
 
 def _miss(outcome: Outcome) -> dict[str, Any]:
+    kind = "" if outcome.kind in ("", outcome.hidden) else f", {outcome.kind}"
     return {
         "number": outcome.number,
-        "hidden": " ".join([outcome.hidden, *outcome.off]) + (outcome.kind and f", {outcome.kind}"),
+        "hidden": " ".join([outcome.hidden, *outcome.off]) + kind,
         "r": outcome.ratio,
         "said": _said(outcome),
         "sentence": outcome.sentence,
