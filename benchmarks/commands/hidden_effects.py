@@ -25,7 +25,8 @@ def hidden_effects(
     block: Annotated[
         str,
         typer.Option(
-            help="single, faint, nothing, parameters, pair, unknown, slow_drift, rigs, or all."
+            help="single, faint, nothing, parameters, pair, unknown, slow_drift, rigs, lab, "
+            "lab_nothing, or all."
         ),
     ],
     n: Annotated[int, typer.Option("--n", min=1, help="Cases of a block; more extend the set.")],

@@ -55,7 +55,10 @@ def measured_text(some: Iterable[Measured], today: str | None = None) -> str:
 CANDIDATES = 6
 """How many of the likeliest candidates are kept."""
 
-ESSENTIALS = ("verdict", "sentence", "effects", "gap", "not_identifiable", "blind", "warnings")
+ESSENTIALS = (
+    *("verdict", "sentence", "effects", "gap", "not_identifiable", "blind", "warnings"),
+    *("tones", "nuisances"),
+)
 """What is kept whole of a `diagnosis.json`."""
 
 

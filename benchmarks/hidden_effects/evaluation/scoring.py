@@ -159,6 +159,8 @@ def _missed(outcome: Outcome) -> bool:
     """Whether a case is one that the block's target speaks against."""
     if not outcome.answered:
         return True
+    if outcome.trouble:
+        return outcome.trouble not in ("said", "quiet")
     if outcome.kind == "outside":
         return outcome.verdict != "unknown"
     if outcome.block == "rigs" and outcome.truth:
@@ -183,9 +185,10 @@ def _said(outcome: Outcome) -> str:
 
 
 def _miss(outcome: Outcome) -> dict[str, Any]:
+    kind = "" if outcome.kind in ("", outcome.hidden) else f", {outcome.kind}"
     return {
         "number": outcome.number,
-        "hidden": " ".join([outcome.hidden, *outcome.off]) + (outcome.kind and f", {outcome.kind}"),
+        "hidden": " ".join([outcome.hidden, *outcome.off]) + kind,
         "r": outcome.ratio,
         "said": _said(outcome),
         "sentence": outcome.sentence,

@@ -4,8 +4,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from benchmarks.hidden_effects.evaluation.verdicts import RIGHT_STRUCTURE, Outcome
+from benchmarks.hidden_effects.evaluation.troubles import RIGHT_STRUCTURE
+from benchmarks.hidden_effects.evaluation.verdicts import Outcome
 from benchmarks.hidden_effects.generation.readout_noise import UGLY
+from benchmarks.hidden_effects.rigs.lab import SIZES
 
 
 @dataclass(frozen=True)
@@ -147,6 +149,20 @@ _RIGS = (
     Rate("nothing: right structure said", _of("nothing", lambda o: o.verdict in RIGHT_STRUCTURE)),
 )
 
+_LAB = (
+    Rate("trouble named, or place and kind said", lambda o: o.trouble == "said", Target(0.75)),
+    Rate("... or with other claims beside it", lambda o: o.trouble in ("said", "beside")),
+    Rate("confidently wrong", lambda o: o.wrong),
+    Rate("detected", lambda o: o.detected),
+    *(Rate(f"{name}: said", _of(name, lambda o: o.trouble == "said")) for name in SIZES),
+)
+"""Targets of both blocks are of 100 troubles and 200 controls at least."""
+
+_LAB_NOTHING = (
+    Rate("alarm", lambda o: o.trouble == "alarm", Target(most=0.03)),
+    Rate("right structure said", lambda o: o.verdict in RIGHT_STRUCTURE),
+)
+
 RATES: dict[str, tuple[Rate, ...]] = {
     "single": _SINGLE,
     "faint": _FAINT,
@@ -158,6 +174,8 @@ RATES: dict[str, tuple[Rate, ...]] = {
     **{f"nothing_{ugly}": _NOTHING_UGLY for ugly in UGLY},
     "slow_drift": _SLOW_DRIFT,
     "rigs": _RIGS,
+    "lab": _LAB,
+    "lab_nothing": _LAB_NOTHING,
 }
 """By block."""
 

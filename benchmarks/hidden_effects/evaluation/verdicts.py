@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from benchmarks.hidden_effects.evaluation.troubles import RIGHT_STRUCTURE, judged
 from benchmarks.hidden_effects.generation.effect_size import UNTOLD
 from benchmarks.hidden_effects.generation.effects import ALL
 from benchmarks.hidden_effects.generation.groups import expected, group
@@ -11,9 +12,6 @@ from benchmarks.hidden_effects.rigs import effect_size
 
 STRUCTURAL = ("effect", "unknown")
 """Verdicts that claim more than parameters."""
-
-RIGHT_STRUCTURE = ("agrees", "parameters")
-"""Verdicts that say that no structure is missing."""
 
 MOST_LEFT = 3.0
 """Noises that such a verdict may leave."""
@@ -72,6 +70,7 @@ class Outcome:
         moved: paths of base parameters that are named as off, in such a block.
         sentence: the answer as a person would say it, or what was raised instead.
         kind: of what a rig of another lab hides; empty elsewhere.
+        trouble: what the answer is worth to a laboratory (`troubles.judged`); empty elsewhere.
         left: the largest misfit of a signal after the amended model, over its noise; None where
             the truth has no noise.
     """
@@ -101,6 +100,7 @@ class Outcome:
     off: tuple[str, ...] = ()
     moved: tuple[str, ...] = ()
     kind: str = ""
+    trouble: str = ""
     left: float | None = None
     sentence: str = ""
 
@@ -181,6 +181,10 @@ def compare(truth: Mapping[str, Any], answer: Mapping[str, Any]) -> Outcome:
         if gap["held_out"] and gap["before"] > (1.0 + VISIBLE) * gap["floor"]:
             outcome.closed.append(gap["closed"])
     _sizes(outcome, truth, effects)
+    if "trouble" in truth:
+        outcome.trouble = judged(truth, answer, named)
+        outcome.truth = (outcome.kind,) if outcome.kind != "nothing" else ()
+        outcome.wrong = outcome.trouble in ("wrong", "beside")
     return outcome
 
 

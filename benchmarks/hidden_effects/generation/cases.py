@@ -327,6 +327,19 @@ class RigsBlock(Block):
         return Case([], [], [], [], {}, truth, texts)
 
 
+@dataclass(frozen=True)
+class LabBlock(Block):
+    """Cases of ordinary troubles of a laboratory, which take turns, or of none."""
+
+    def draw(self, seed: int, number: int) -> Case:
+        """Case of a number, 1 and up; the same seed and number give the same bits."""
+        # Here, for no other block needs its simulators.
+        from benchmarks.hidden_effects.rigs.lab import draw
+
+        texts, truth = draw(seed, number, self.name)
+        return Case([], [], [], [], {}, truth, texts)
+
+
 BLOCKS: dict[str, Block] = {
     block.name: block
     for block in (
@@ -340,6 +353,8 @@ BLOCKS: dict[str, Block] = {
         *(Block(f"nothing_{ugly}", ugly=ugly) for ugly in UGLY),
         Block("slow_drift", ("creep", "leakage", "warm_up"), ugly="drift"),
         RigsBlock("rigs"),
+        LabBlock("lab"),
+        LabBlock("lab_nothing"),
     )
 }
 """By name, in the order of the table."""

@@ -135,7 +135,7 @@ class DrivenCampaign:
         """True motion and the sensor's readings (m, rad) of file i, or of its first seconds."""
         rig, reference = self.rig, self.references[i]
         rows = int(min(len(reference.q), seconds * rig.rate))
-        sensing = self.sensor, self._noise(i)
+        sensing = self.sensor, self.noise(i)
         rests = self._rests(effects)
         controller = Controller(self.believed, reference, *sensing, self.bandwidth, rests)
         transmission = Transmission()
@@ -221,7 +221,8 @@ class DrivenCampaign:
             ERROR_SHARE * self.sensor.rms, self.rig.peak_force / self.rig.inertia
         )
 
-    def _noise(self, i: int) -> np.ndarray:
+    def noise(self, i: int) -> np.ndarray:
+        """Noise of every reading of file i (m, rad)."""
         rng = np.random.default_rng((*self.seed, i, 7))
         return self.sensor.noise.draw(rng, np.arange(len(self.references[i].q)) / self.rig.rate)
 

@@ -86,14 +86,14 @@ def folder(
         tolerance: by column, where the lab states one.
         names: that the lab has for its columns.
     """
-    texts = {_name(i): _csv(rate, table, names) for i, table in enumerate(tables)}
+    texts = {trial_name(i): _csv(rate, table, names) for i, table in enumerate(tables)}
     lines = ['title = "Logs of a drive"', 'model = "model.toml"', *names.lines(list(tables[0]))]
     if tolerance:
         lines += ["", "[tolerance]", *(f"{key} = {_number(x)}" for key, x in tolerance.items())]
     for i in range(len(tables)):
-        lines += ["", f'[trials."{_name(i)}"]', f"order = {i + 1}"]
+        lines += ["", f'[trials."{trial_name(i)}"]', f"order = {i + 1}"]
         if i in repeats:
-            lines.append(f'repeat_of = "{_name(repeats[i])}"')
+            lines.append(f'repeat_of = "{trial_name(repeats[i])}"')
     return texts | {"dataset.toml": "\n".join(lines) + "\n", "model.toml": model}
 
 
@@ -102,7 +102,8 @@ def digits(step: float) -> int:
     return max(0, math.ceil(-math.log10(step)) + 2)
 
 
-def _name(i: int) -> str:
+def trial_name(i: int) -> str:
+    """Name of a file, counted from 0."""
     return f"run_{i + 1:02d}.csv"
 
 
@@ -185,6 +186,26 @@ stiffness_n_m_per_rad = {_number(rig.stiffness)}
 rest_deg = 0.0
 """
     return text
+
+
+def friction(rig: Rig, level: float, presliding: float) -> str:
+    """Table of dry friction to add to the model of a slide or a joint.
+
+    Args:
+        rig: the axis.
+        level: of the friction (N, N m).
+        presliding: distance in which it builds up (m, rad).
+    """
+    slides = rig.kind == "slide"
+    force, speed = ("n", "mm_per_s") if slides else ("n_m", "deg_per_s")
+    distance = ("um", 1e6) if slides else ("deg", math.degrees(1.0))
+    return f"""
+[{"coulomb_friction" if slides else "joint_friction"}]
+static_{force} = {_number(level)}
+dynamic_{force} = {_number(level)}
+stribeck_speed_{speed} = 5
+presliding_{distance[0]} = {_number(distance[1] * presliding)}
+"""
 
 
 FASTER = 3.0

@@ -158,6 +158,27 @@ class DirectionalGain(HiddenEffect):
 
 
 @dataclass(frozen=True)
+class DriveGain(HiddenEffect):
+    """A drive that gives `size` of itself more than it says."""
+
+    name: ClassVar[str] = "drive_gain"
+
+    def transmission(self, drive: Transmission) -> Transmission:  # noqa: D102
+        gain = 1.0 + self.size
+        return replace(drive, forward=gain * drive.forward, backward=gain * drive.backward)
+
+
+@dataclass(frozen=True)
+class DeadBand(HiddenEffect):
+    """A drive that gives nothing below a command of `size`, and so much less above it."""
+
+    name: ClassVar[str] = "drive_dead_zone"
+
+    def transmission(self, drive: Transmission) -> Transmission:  # noqa: D102
+        return replace(drive, dead=self.size)
+
+
+@dataclass(frozen=True)
 class DriveDelay(HiddenEffect):
     """A force that comes `size` seconds late."""
 

@@ -17,6 +17,8 @@ def document(verdict="agrees", *effects):
         "warnings": [],
         "blind": [],
         "candidates": [],
+        "tones": {},
+        "nuisances": [],
     }
 
 

@@ -1,4 +1,4 @@
-"""From the logged command to the force that acts: line between rows, delay, lag, gain by sign."""
+"""From the logged command to the force: line between rows, delay, lag, dead band, gain by sign."""
 
 import math
 from dataclasses import dataclass, field
@@ -13,12 +13,14 @@ class Transmission:
         lag: time constant of a first-order lag (s); 0 without.
         forward: gain of positive commands.
         backward: gain of negative commands.
+        dead: what the drive takes off the amount of every command (N, N m).
     """
 
     delay: float = 0.0
     lag: float = 0.0
     forward: float = 1.0
     backward: float = 1.0
+    dead: float = 0.0
 
 
 @dataclass
@@ -77,6 +79,8 @@ class Drive:
 
     def _gained(self, command: float) -> float:
         gain = self.transmission.forward if command > 0.0 else self.transmission.backward
+        if self.transmission.dead:
+            command = math.copysign(max(abs(command) - self.transmission.dead, 0.0), command)
         return gain * command
 
 
