@@ -6,8 +6,10 @@ from pma_gym.data.datasets.dataset import NamedTrial
 from pma_gym.data.trial_columns import BY_QUANTITY
 from pma_gym.discovery.diagnosis import Diagnosis
 from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
+from pma_gym.discovery.fitting.journal import Journal
 from pma_gym.discovery.grey_box.conclusions import Conclusions, path_of
 from pma_gym.discovery.grey_box.effect_selection import EffectSelection
+from pma_gym.discovery.grey_box.kept_fits import kept_in
 from pma_gym.discovery.grey_box.sentence import sentence
 from pma_gym.discovery.grey_box.thresholds import (
     MATERIAL,
@@ -94,7 +96,8 @@ def answered(
     tolerance: Mapping[str, float],
     seed: int,
     tell: Callable[[str, int, int], None],
-    threads: int = 1,
+    threads: int,
+    journal: Journal,
 ) -> Diagnosis:
     """The diagnosis of a free rig.
 
@@ -106,6 +109,7 @@ def answered(
         seed: of the starts of fits.
         tell: called with a step's name, what is done of it and its total.
         threads: that filters run in at once.
+        journal: keeps fits.
     Raises:
         TrialError: trials with fewer readings than a fit needs.
     """
@@ -113,10 +117,11 @@ def answered(
     selection = EffectSelection(
         model, logged, candidates or (), seed=seed, tell=tell, threads=threads
     )
-    path = [selection.base()] if candidates is None else selection.run()
-    tell("putting the answer together", 0, 1)
     limits = {
         BY_QUANTITY[name].name: value / SI_FACTORS[BY_QUANTITY[name].unit]
         for name, value in tolerance.items()
     }
-    return diagnosis(Conclusions(selection, path, named, limits, candidates or ()))
+    with kept_in(journal):
+        path = [selection.base()] if candidates is None else selection.run()
+        tell("putting the answer together", 0, 1)
+        return diagnosis(Conclusions(selection, path, named, limits, candidates or ()))

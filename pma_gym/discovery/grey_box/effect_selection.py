@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
 from pma_gym.discovery.fitting.free_parameters import free_parameters, prior
+from pma_gym.discovery.grey_box.kept_fits import fit
 from pma_gym.discovery.grey_box.thresholds import (
     FAINT,
     LIKE,
@@ -33,7 +34,6 @@ from pma_gym.estimation.likelihood_fit import (
     STEP,
     Coordinate,
     Fit,
-    fit,
     value_of,
     with_tied,
     with_values,
@@ -78,6 +78,9 @@ STARTS, SMOOTH_STARTS = 8, 3
 
 BEAM, BESIDE = 3, 3
 """Hypotheses that a stage hands on, and moves that each but the likeliest is extended by."""
+
+AFTER = 6
+"""Moves that take as long as what follows a stage's fits, about: for the time left."""
 
 MOST_TRIALS = 6
 """With so many trials at most, each is once taken for an odd one.
@@ -337,7 +340,8 @@ class EffectSelection:
 
         def start(k: int, odd: int) -> None:
             for linear in kinds:
-                self.tell("refitting parameters", k, count)
+                # It may end after three: between that and all, until then.
+                self.tell("refitting parameters", k, count + 2 if k > 3 else (count + 3) // 2)
                 box = self.box(self.model, linear)
                 fits[linear].append(
                     fit(box, self._begin(box, coordinates, tied, k, odd), coordinates, tied)
@@ -834,11 +838,13 @@ class EffectSelection:
                 break
             bent = self._is_bent(tried[0][-1], MATERIAL)
             for at, chain in enumerate(tried[: 2 if bent else 1]):
+                self.tell(f"effect {stage + 1}", len(tried) + 2 * at, len(tried) + AFTER)
                 *before, last = chain
                 again = self.tried(before[-1], last.moves[-1], careful=True)
                 if again.fit.value > last.fit.value:
                     tried[at] = [*before, again]
             tried.sort(key=self._worth, reverse=True)
+            self.tell(f"effect {stage + 1}", len(tried) + 4, len(tried) + AFTER)
             # Others begin where the likeliest one ended: no start is ahead.
             for at, (*before, last) in enumerate(tried[1:BEAM], 1):
                 tried[at] = [*before, self._again(last, tried[0][-1])]
@@ -874,18 +880,21 @@ class EffectSelection:
     def _extended(self, beam: Sequence[list[Hypothesis]], step: str) -> list[list[Hypothesis]]:
         """Every chain with each of its most promising moves, the likeliest for its price first."""
         seen, tried = set[tuple[frozenset[str], bool]](), list[list[Hypothesis]]()
-        for rank, chain in enumerate(beam):
+        plans = [
+            (chain, move)
+            for rank, chain in enumerate(beam)
+            for move in self._worth_a_fit(chain[-1])[: BESIDE if rank else None]
+        ]
+        for number, (chain, move) in enumerate(plans):
             now = chain[-1]
-            moves = self._worth_a_fit(now)
-            for number, move in enumerate(moves if not rank else moves[:BESIDE]):
-                key = frozenset(each.name for each in (*now.moves, move)), move.start is not None
-                if key in seen:
-                    continue
-                seen.add(key)
-                self.tell(step, number, len(moves))
-                larger = self.tried(now, move)
-                self.gains.setdefault(move.name, larger.fit.value - now.fit.value)
-                tried += [[*chain, larger]] if not self._at_end(larger) else []
+            key = frozenset(each.name for each in (*now.moves, move)), move.start is not None
+            if key in seen:
+                continue
+            seen.add(key)
+            self.tell(step, number, len(plans) + AFTER)
+            larger = self.tried(now, move)
+            self.gains.setdefault(move.name, larger.fit.value - now.fit.value)
+            tried += [[*chain, larger]] if not self._at_end(larger) else []
         return sorted(tried, key=self._worth, reverse=True)
 
 
