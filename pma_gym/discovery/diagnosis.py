@@ -49,8 +49,7 @@ class Diagnosis:
         gap: by column name, over all trials; of slides and joints that of predictions a
             short time ahead.
         candidates: the whole catalogue, the likeliest first.
-        next_experiment: what to measure next, where that would tell more; None for slides and
-            joints.
+        next_experiment: what to measure next, where that would tell more.
         model: the amended model.
         given: the model as it was given.
         not_identifiable: paths of parameters that these data do not determine, with the reason.

@@ -78,8 +78,7 @@ def diagnose(
         journal: a folder in which finished fits are kept, from which an interrupted diagnosis goes
             on; None keeps nothing.
         progress: called with a step's name, what is done of it and its total.
-        propose: whether to look for the next experiment too, which takes seconds; slides and joints
-            have none.
+        propose: whether to look for the next experiment too, which takes seconds.
         checks: whether a column of a data set that is certainly in another unit is refused; else it
             is only said.
     Returns:
@@ -202,7 +201,14 @@ class _Work:
         # Whatever a fit or a filter is computed by may be of another version.
         question = f"likelihood of version {source_digest()}"
         journal = Journal(self.folder, [each.trial for each in named], given, question)
-        options = dataset.tolerance, self.seed, self._tell, self.jobs, journal
+        options = (
+            dataset.tolerance,
+            self.seed,
+            self._tell,
+            self.jobs,
+            journal,
+            self.propose and search,
+        )
         return self._timed("grey box", lambda: answered(given, named, every, *options))
 
     def _problem(

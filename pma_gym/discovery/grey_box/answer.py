@@ -10,6 +10,7 @@ from pma_gym.discovery.fitting.journal import Journal
 from pma_gym.discovery.grey_box.conclusions import Conclusions, path_of
 from pma_gym.discovery.grey_box.effect_selection import EffectSelection
 from pma_gym.discovery.grey_box.kept_fits import kept_in
+from pma_gym.discovery.grey_box.next_trial import next_trial
 from pma_gym.discovery.grey_box.sentence import sentence
 from pma_gym.discovery.grey_box.thresholds import (
     MATERIAL,
@@ -24,8 +25,9 @@ from pma_gym.plant.model import Model
 from pma_gym.units import SI_FACTORS
 
 
-def diagnosis(conclusions: Conclusions) -> Diagnosis:
-    """The answer with its conclusions."""
+def diagnosis(conclusions: Conclusions, propose: bool) -> Diagnosis:
+    """The answer with its conclusions, and the next experiment where one is to be proposed."""
+    following, none_helps = next_trial(conclusions) if propose else (None, "")
     base, last = conclusions.path[0], conclusions.last
     named = conclusions.verdict == "effect"
     floors = {}
@@ -45,7 +47,7 @@ def diagnosis(conclusions: Conclusions) -> Diagnosis:
         parameters=conclusions.parameters,
         gap=conclusions.gap,
         candidates=(),
-        next_experiment=None,
+        next_experiment=following,
         model=conclusions.model,
         given=conclusions.selection.model,
         approximate=Approximate(conclusions.effects, conclusions.left, conclusions.holds_out(last))
@@ -56,7 +58,7 @@ def diagnosis(conclusions: Conclusions) -> Diagnosis:
         states=conclusions.states,
         trials=conclusions.records,
         steps=_steps(conclusions),
-        warnings=(WORSE,) if conclusions.is_worse else (),
+        warnings=(*([WORSE] if conclusions.is_worse else []), *filter(None, [none_helps])),
     )
 
 
@@ -98,6 +100,7 @@ def answered(
     tell: Callable[[str, int, int], None],
     threads: int,
     journal: Journal,
+    propose: bool,
 ) -> Diagnosis:
     """The diagnosis of a free rig.
 
@@ -110,6 +113,7 @@ def answered(
         tell: called with a step's name, what is done of it and its total.
         threads: that filters run in at once.
         journal: keeps fits.
+        propose: whether to look for the next experiment too.
     Raises:
         TrialError: trials with fewer readings than a fit needs.
     """
@@ -124,4 +128,5 @@ def answered(
     with kept_in(journal):
         path = [selection.base()] if candidates is None else selection.run()
         tell("putting the answer together", 0, 1)
-        return diagnosis(Conclusions(selection, path, named, limits, candidates or ()))
+        conclusions = Conclusions(selection, path, named, limits, candidates or ())
+        return diagnosis(conclusions, propose)

@@ -230,6 +230,7 @@ class EffectSelection:
         longest = max(float(each.time[-1] - each.time[0]) for each in logged)
         self.memory = 4.0 * self.span, max(longest / 5.0, 8.0 * self.span)
         self.gains: dict[str, float] = {}
+        self.fitted: dict[frozenset[str], Hypothesis] = {}
         self.noise = [n / self.block**0.5 for n in self.noise]
         self._rows: dict[tuple[int, bool], list[Rows]] = {}
         self.force = self._force()
@@ -834,6 +835,7 @@ class EffectSelection:
         best, beam = [base], [[base]]
         for stage in range(MOST_EFFECTS):
             tried = self._extended(beam, f"effect {stage + 1}")
+            self._keep(tried)
             if not tried or self._lead(tried[0], best) < 0.0:
                 break
             bent = self._is_bent(tried[0][-1], MATERIAL)
@@ -849,6 +851,7 @@ class EffectSelection:
             for at, (*before, last) in enumerate(tried[1:BEAM], 1):
                 tried[at] = [*before, self._again(last, tried[0][-1])]
             tried.sort(key=self._worth, reverse=True)
+            self._keep(tried)
             *before, now, last = tried[0]
             chain = [*before, self._again(now, last), last]
             if len(chain) == 2:
@@ -869,6 +872,11 @@ class EffectSelection:
             if self._is_bent(best[-1], MATERIAL):
                 beam += [c for c in tried[1:BEAM] if self._lead(c, c[:-1]) > 0.0]
         return best
+
+    def _keep(self, tried: Sequence[Sequence[Hypothesis]]) -> None:
+        """Keep what was fitted last by what was added, the likeliest of each."""
+        for *_, last in reversed(tried):
+            self.fitted[frozenset(move.name for move in last.moves)] = last
 
     def _worth(self, chain: Sequence[Hypothesis]) -> float:
         """Log likelihood of a chain's last hypothesis, less its price."""

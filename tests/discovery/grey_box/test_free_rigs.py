@@ -255,3 +255,46 @@ def test_an_inertia_far_from_the_data_sheet_is_said_and_what_to_write_helps():
     share = float(said[1]) / RIGS["joint"][0]
     again = diagnose(trials, model("joint", inertia=share, presliding=NEAR["joint"]))
     assert again.verdict in ("agrees", "parameters") and not again.effects, again.sentence
+
+
+def swings(tones, size, noise_deg):
+    """A weight on an arm under sums of sines, its logs, and its model without the weight."""
+    known = model("joint", inertia=1.0).replace({"encoder.noise_deg": noise_deg})
+    plant = Plant(known.with_effects({"joint_weight": {"moment_n_m": 0.4, "offset_deg": 0.0}}))
+    generator, trials, time = np.random.default_rng(0), [], np.arange(0.0, 4.0, 0.01)
+    for k in range(2):
+        phases = generator.uniform(0.0, 6.0, 3)
+        waves = 6.283 * np.outer(tones, time) + phases[:, None]
+        pull = (np.sin(waves) - np.sin(phases)[:, None]).sum(axis=0)
+        trials.append(logged(plant, Trial(time, {"torque_command": size * pull}), k))
+    return plant, trials, known
+
+
+def logged(plant, trial, seed):
+    angle = plant.simulate(trial, noise=True, seed=seed).measurements["angle"]
+    return Trial(trial.time, trial.commands, {"angle": angle})
+
+
+def test_the_proposed_trial_tells_a_weight_from_a_spring_that_small_swings_do_not():
+    plant, trials, known = swings((2.1, 3.3, 5.0), 0.06, 0.3)
+    first = diagnose(trials, known)
+    (effect,) = first.effects
+    assert {effect.name, *effect.confused_with} == {"joint_weight", "joint_spring"}
+    following = first.next_experiment
+    assert set(following.separates) == {effect.name, *effect.confused_with}
+    assert following.expected_odds > 1e5 and following.minutes < 1.0
+    commands = [each.commands["torque_command"] for each in (following.trial, *trials)]
+    least, most = min(map(np.min, commands[1:])), max(map(np.max, commands[1:]))
+    assert np.min(commands[0]) >= least and np.max(commands[0]) <= most
+    (decided,) = diagnose([*trials, logged(plant, following.trial, 9)], known).effects
+    assert (decided.name, decided.confused_with) == ("joint_weight", ())
+    assert decided.parameters["moment_n_m"].value == pytest.approx(0.4, rel=0.01)
+
+
+def test_where_no_trial_within_the_commands_of_the_logs_decides_that_is_said():
+    _, trials, known = swings((0.8, 1.4, 2.0), 0.003, 0.1)
+    diagnosis = diagnose(trials, known)
+    assert any(effect.confused_with for effect in diagnosis.effects)
+    assert diagnosis.next_experiment is None
+    (said,) = diagnosis.warnings
+    assert "another load or another arm" in said and "joint spring" in said
