@@ -10,6 +10,7 @@ from pma_gym.discovery.fitting.journal import Journal
 from pma_gym.discovery.grey_box.conclusions import Conclusions, path_of
 from pma_gym.discovery.grey_box.effect_selection import EffectSelection
 from pma_gym.discovery.grey_box.kept_fits import kept_in
+from pma_gym.discovery.grey_box.latent_law import drafted_effect
 from pma_gym.discovery.grey_box.next_trial import next_trial
 from pma_gym.discovery.grey_box.sentence import sentence
 from pma_gym.discovery.grey_box.thresholds import (
@@ -54,6 +55,12 @@ def diagnosis(conclusions: Conclusions, propose: bool) -> Diagnosis:
         if approximate
         else None,
         law=conclusions.law if conclusions.verdict == "unknown" or approximate else None,
+        draft=drafted_effect(conclusions.law, conclusions.selection.model.rig)
+        if conclusions.verdict == "unknown" and conclusions.law
+        else "",
+        tones={conclusions.selection.model.plant: conclusions.line[0]}
+        if conclusions.verdict == "unknown" and conclusions.line
+        else {},
         floors=floors,
         states=conclusions.states,
         trials=conclusions.records,

@@ -17,7 +17,7 @@ from pma_gym.discovery.diagnosis import Verdict
 from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
 from pma_gym.discovery.grey_box.effect_selection import EffectSelection, Hypothesis, Move, slot
 from pma_gym.discovery.grey_box.kept_fits import fit
-from pma_gym.discovery.grey_box.latent_law import latent_force, latent_law
+from pma_gym.discovery.grey_box.latent_law import latent_force, latent_law, latent_line
 from pma_gym.discovery.grey_box.thresholds import (
     COMPLETE,
     CONFIDENCE,
@@ -486,6 +486,11 @@ class Conclusions:
         base = self.path[0]
         rows = max(1.0, 2.0 * base.fit.point.memory / self.selection.span)
         return latent_law(self.smooth, self.selection.model.rig, rows)
+
+    @cached_property
+    def line(self) -> tuple[float, float] | None:
+        """Frequency (Hz) at which a force without a law oscillates, and the share of that."""
+        return None if self.law else latent_line(self.smooth)
 
     @cached_property
     def states(self) -> dict[str, TrialState]:

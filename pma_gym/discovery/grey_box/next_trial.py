@@ -127,9 +127,11 @@ def _commands(conclusions: Conclusions) -> Iterator[tuple[str, Trial]]:
         said = [figure(end / SI_FACTORS[unit]) for end in ends]
         between = f"between {said[0]} and {said[1]} {unit}"
         for period in [share * usual for share in PERIODS]:
-            time = np.arange(0.0, max(period, 0.5 * usual) + 0.5 * step, step)
+            cycles = max(1.0, 0.5 * usual / period)
+            turns = np.linspace(0.0, cycles, round(cycles * period / step) + 1)
+            time = step * np.arange(len(turns))
             for words, (places, levels) in CYCLES.items():
-                shape = np.interp(time / period % 1.0, places, levels)
+                shape = np.interp(turns % 1.0, places, levels)
                 moved = rest + np.where(shape < 0.0, rest - ends[0], ends[1] - rest) * shape
                 every = f"{words}, one in {figure(period, 2)} s"
                 yield f"{title} {between}, {every}", Trial(time, {name: moved})

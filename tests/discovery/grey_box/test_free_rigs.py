@@ -13,9 +13,11 @@ from pma_gym import Plant
 from pma_gym.data.datasets.dataset import read_dataset
 from pma_gym.data.trial import Trial
 from pma_gym.discovery import diagnose
+from pma_gym.discovery.grey_box.latent_law import latent_law, latent_line
 from pma_gym.effects import CATALOGUE
+from pma_gym.effects.user_effects import load_effects
 from pma_gym.estimation.innovations import Point
-from pma_gym.estimation.smoother import smoothed
+from pma_gym.estimation.smoother import Smoothed, smoothed
 from pma_gym.plant.model import Model
 from tests.estimation.linear_slide import box
 
@@ -298,3 +300,67 @@ def test_where_no_trial_within_the_commands_of_the_logs_decides_that_is_said():
     assert diagnosis.next_experiment is None
     (said,) = diagnosis.warnings
     assert "another load or another arm" in said and "joint spring" in said
+
+
+def bumped():
+    """Logs of a joint with a bump of torque in its way."""
+    generator, trials, time = np.random.default_rng(0), [], np.arange(400) / 100.0
+    for phases in generator.uniform(0.0, 6.0, (3, 3, 1)):
+        waves = np.cos(6.283 * np.outer((0.4, 1.1, 1.9), time) + phases)
+        torques = np.minimum(time, 1.0) * (np.array([0.03, 0.06, 0.06]) @ waves)
+        angle, spin, read = 0.0, 0.0, []
+        for torque in torques.tolist():
+            read.append(angle)
+            for _ in range(SUBSTEPS):
+                bump = 0.05 * np.exp(-50.0 * (angle - 0.2) ** 2)
+                spin += 1.0 / RATE_HZ / SUBSTEPS / 0.01 * (torque - 0.05 * spin + bump)
+                angle += 1.0 / RATE_HZ / SUBSTEPS * spin
+        read += 2e-4 * generator.standard_normal(len(time))
+        trials.append(Trial(time, {"torque_command": torques}, {"angle": read}))
+    return trials
+
+
+@pytest.mark.usefixtures("forget_user_effects")
+def test_a_torque_that_no_effect_has_is_drafted_as_a_user_effect_which_closes_the_gap(tmp_path):
+    known = model("joint", inertia=1.0)
+    trials = bumped()
+    first = diagnose(trials, known)
+    assert first.verdict == "unknown" and "goes with angle" in first.sentence, first.sentence
+    assert first.next_experiment is None
+    # The law is the bump, where the joint was.
+    at = np.radians(first.law.at)
+    assert first.law.law == pytest.approx(0.05 * np.exp(-50.0 * (at - 0.2) ** 2), abs=0.01)
+    file = tmp_path / "proposed_effect.py"
+    file.write_text(first.draft)
+    load_effects(file)
+    (effect,) = (again := diagnose(trials, known, propose=False)).effects
+    assert effect.name == "drafted" and again.draft == ""
+    assert effect.parameters["share_percent"].value == pytest.approx(100.0, abs=20.0)
+    assert again.gap["angle_deg"].after < 0.25 * first.gap["angle_deg"].after
+
+
+@pytest.mark.parametrize(
+    ("force", "hertz", "goes_with"),
+    [
+        (lambda t, x: np.sin(6.283 * 7.3 * t), 7.3, None),
+        (lambda t, x: x**2 - 0.5, None, "angle"),
+        # The motion's own frequency is no line of its own.
+        (lambda t, x: np.sin(6.283 * t + 0.3), None, None),
+        (lambda t, x: np.random.default_rng(3).standard_normal(len(t)), None, None),
+    ],
+)
+def test_a_latent_force_that_oscillates_or_goes_with_a_place_is_told_from_one_that_does_neither(
+    force, hertz, goes_with
+):
+    trials = []
+    for phase in (0.0, 1.0, 2.5):
+        time = np.arange(0.0, 5.0, 0.01)
+        angle = np.sin(6.283 * time + phase)
+        speed = 6.283 * np.cos(6.283 * time + phase)
+        trials.append(Smoothed(time, force(time, angle), 0.0 * time, angle, speed, 0.0 * time))
+    law = latent_law(trials, model("joint").rig, 10.0)
+    line = None if law else latent_line(trials)
+    assert (law and law.variable.partition(" ")[0]) == goes_with
+    assert (line is None) == (hertz is None)
+    if line:
+        assert line[0] == pytest.approx(hertz, abs=0.1) and line[1] > 0.9
