@@ -74,8 +74,8 @@ def _describe(diagnosis: Diagnosis) -> list[str]:
             "where it comes from.",
         ]
     drafted = (
-        "Diagnose again with `--effect` and `proposed_effect.py` beside this page, which has it as a "
-        "user effect; then make its law what you think acts."
+        "Diagnose again with `--effect` and `proposed_effect.py` beside this page, which has it as "
+        "a user effect; then make its law what you think acts."
     )
     write = (
         "Write it as a user effect, one Python file, and diagnose again with `--effect FILE.py`."

@@ -5,10 +5,10 @@ import shutil
 import numpy as np
 import pytest
 
-from pma_gym.data.datasets.dataset import Dataset, read_dataset
+from pma_gym.data.datasets.dataset import read_dataset
 from pma_gym.data.files.trial_files import read_trial
 from pma_gym.data.trial import Trial
-from pma_gym.discovery.experiments.command_file import proposed_file
+from pma_gym.discovery.experiments.command_file import from_rest, proposed_file
 from pma_gym.plant.plant import Plant
 from tests.discovery.grey_box import test_free_rigs
 from tests.discovery.preparation.data_checks.logs import GIVEN, log, write
@@ -82,8 +82,6 @@ def test_a_lab_of_volts_gets_volts(tmp_path):
     assert text.splitlines()[0] == "time_s,motor_voltage_v,regulator_voltage_v"
 
 
-def test_a_slide_has_no_rest_without_its_command_so_the_file_begins_with_it(tmp_path):
-    trial = Trial(np.arange(101) / 100.0, {"motor_voltage": 5.0 + np.arange(101) / 100.0})
-    path = tmp_path / "next.csv"
-    path.write_bytes(proposed_file(trial, Dataset("", None, ()), test_free_rigs.model("slide")))
-    assert read_trial(path).commands["motor_voltage"] == pytest.approx(5.0 + np.arange(101) / 100.0)
+def test_a_slide_has_no_rest_without_its_command():
+    trial = experiment()
+    assert from_rest(trial, test_free_rigs.model("slide")) is trial

@@ -51,25 +51,22 @@ def test_neither_jobs_nor_a_journal_nor_an_interrupt_change_a_byte(
     assert {path.name: path.stat().st_mtime_ns for path in tmp_path.iterdir()} == times
 
 
-def test_the_fits_of_an_interrupted_joint_are_restored_bit_for_bit_and_damaged_ones_made_anew(
-    tmp_path,
-):
-    trials, sheet = test_free_rigs.logs("joint", 1.0), test_free_rigs.model("joint")
+def test_fits_of_an_interrupted_joint_are_restored_bit_for_bit_and_damaged_ones_made_anew(tmp_path):
+    asked = test_free_rigs.logs("joint", 1.0), test_free_rigs.model("joint")
 
     def progress(name, number, total):
         if number == 2:
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        workflow.refit(trials, sheet, journal=tmp_path, progress=progress)
-    left = contents(tmp_path)
-    whole = workflow.refit(trials, sheet).text()
-    assert workflow.refit(trials, sheet, journal=tmp_path).text() == whole
+        workflow.refit(*asked, journal=tmp_path, progress=progress)
+    left, whole = contents(tmp_path), workflow.refit(*asked).text()
+    assert workflow.refit(*asked, journal=tmp_path).text() == whole
     assert left and left.items() < contents(tmp_path).items()
     for (name, content), damage in zip(left.items(), DAMAGES, strict=False):
         (tmp_path / name).write_text(json.dumps(damage(json.loads(content))))
     with pytest.warns(JournalWarning):
-        assert workflow.refit(trials, sheet, journal=tmp_path).text() == whole
+        assert workflow.refit(*asked, journal=tmp_path).text() == whole
     assert left.items() < contents(tmp_path).items()
 
 
