@@ -79,8 +79,12 @@ STARTS, SMOOTH_STARTS = 8, 3
 BEAM, BESIDE = 3, 3
 """Hypotheses that a stage hands on, and moves that each but the likeliest is extended by."""
 
-AFTER = 6
-"""Moves that take as long as what follows a stage's fits, about: for the time left."""
+COST, AFTER = 3, 1.5
+"""For the time left.
+
+What an effect's fits take, in those of a parameter by trial; the same for fits that begin far off,
+in others. What a stage takes, in its moves' fits.
+"""
 
 MOST_TRIALS = 6
 """With so many trials at most, each is once taken for an odd one.
@@ -840,13 +844,13 @@ class EffectSelection:
                 break
             bent = self._is_bent(tried[0][-1], MATERIAL)
             for at, chain in enumerate(tried[: 2 if bent else 1]):
-                self.tell(f"effect {stage + 1}", len(tried) + 2 * at, len(tried) + AFTER)
+                self.tell(f"effect {stage + 1}", self.planned * (4 + at) // 6, self.planned)
                 *before, last = chain
                 again = self.tried(before[-1], last.moves[-1], careful=True)
                 if again.fit.value > last.fit.value:
                     tried[at] = [*before, again]
             tried.sort(key=self._worth, reverse=True)
-            self.tell(f"effect {stage + 1}", len(tried) + 4, len(tried) + AFTER)
+            self.tell(f"effect {stage + 1}", self.planned * 5 // 6, self.planned)
             # Others begin where the likeliest one ended: no start is ahead.
             for at, (*before, last) in enumerate(tried[1:BEAM], 1):
                 tried[at] = [*before, self._again(last, tried[0][-1])]
@@ -873,6 +877,14 @@ class EffectSelection:
                 beam += [c for c in tried[1:BEAM] if self._lead(c, c[:-1]) > 0.0]
         return best
 
+    def _cost(self, now: Hypothesis, move: Move) -> int:
+        """How long a move's fits take, in those of a parameter by trial."""
+        if move.candidate is None:
+            return 1
+        larger = move.candidate.beside(now.box.model)
+        finer = self.substeps[is_rough(now.box.model)] / self.substeps[is_rough(larger)]
+        return round(finer * (COST if move.start is None else COST**2))
+
     def _keep(self, tried: Sequence[Sequence[Hypothesis]]) -> None:
         """Keep what was fitted last by what was added, the likeliest of each."""
         for *_, last in reversed(tried):
@@ -893,13 +905,15 @@ class EffectSelection:
             for rank, chain in enumerate(beam)
             for move in self._worth_a_fit(chain[-1])[: BESIDE if rank else None]
         ]
-        for number, (chain, move) in enumerate(plans):
+        costs = np.cumsum([0, *(self._cost(chain[-1], move) for chain, move in plans)])
+        self.planned = int(AFTER * costs[-1])
+        for (chain, move), done in zip(plans, costs.tolist(), strict=False):
             now = chain[-1]
             key = frozenset(each.name for each in (*now.moves, move)), move.start is not None
             if key in seen:
                 continue
             seen.add(key)
-            self.tell(step, number, len(plans) + AFTER)
+            self.tell(step, done, self.planned)
             larger = self.tried(now, move)
             self.gains.setdefault(move.name, larger.fit.value - now.fit.value)
             tried += [[*chain, larger]] if not self._at_end(larger) else []

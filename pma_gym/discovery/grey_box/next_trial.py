@@ -129,7 +129,7 @@ def _commands(conclusions: Conclusions) -> Iterator[tuple[str, Trial]]:
         for period in [share * usual for share in PERIODS]:
             cycles = max(1.0, 0.5 * usual / period)
             turns = np.linspace(0.0, cycles, round(cycles * period / step) + 1)
-            time = step * np.arange(len(turns))
+            time = np.arange(0.0, len(turns)) * step
             for words, (places, levels) in CYCLES.items():
                 shape = np.interp(turns % 1.0, places, levels)
                 moved = rest + np.where(shape < 0.0, rest - ends[0], ends[1] - rest) * shape
