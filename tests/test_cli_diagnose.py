@@ -16,6 +16,7 @@ from pma_gym.discovery.result.misfit import Gap, Place
 from pma_gym.discovery.result.next_experiment import NextExperiment
 from pma_gym.discovery.result.noise import Judgement
 from pma_gym.plant.model import load_model
+from tests.effects.test_user_effects import DRAG
 
 TIME = np.arange(20) / 10
 TRIAL = Trial(TIME, {"motor_voltage": TIME}, {"load": 98.0 * TIME})
@@ -101,6 +102,16 @@ def test_diagnose_writes_its_files_and_says_what_it_found(run, engine, tmp_path)
         "again.",
         "Written to lab-diagnosis: diagnosis.json, report.html, next.csv, trials.toml, model.toml",
     ]
+
+
+@pytest.mark.usefixtures("forget_user_effects")
+def test_a_drafted_effect_is_written_and_kept_as_long_as_it_is_loaded(run, engine, tmp_path):
+    engine.answer = replace(DIAGNOSIS, draft=DRAG)
+    assert run("diagnose", "lab")[0] == 0
+    draft = tmp_path / "lab-diagnosis" / "proposed_effect.py"
+    draft.write_text(changed := draft.read_text() + "\n# Mine.\n")
+    assert run("diagnose", "lab", "--effect", str(draft), "--force")[0] == 0
+    assert draft.read_text() == changed
 
 
 def test_the_model_is_the_data_sets_own_unless_named(run, engine, tmp_path):

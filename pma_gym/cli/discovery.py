@@ -22,6 +22,7 @@ from pma_gym.cli.options import JsonOption
 from pma_gym.cli.progress import StepProgress
 from pma_gym.cli.terminal import model_names, print_json, say, warnings_said, warnings_said_at_once
 from pma_gym.data.datasets.dataset import Dataset, read_dataset
+from pma_gym.effects.user_effects import NAMED
 from pma_gym.files import OutputError
 from pma_gym.plant.model import Model, dump_model, load_model
 
@@ -132,6 +133,9 @@ class Results:
                 self.journal.rmdir()
 
 
+DRAFT = "proposed_effect.py"
+"""File of a user effect with the law that was found."""
+
 INTERRUPTED = 130
 LONGEST_S = 1.5
 """How long after Ctrl-C a compiled integration may go on."""
@@ -193,7 +197,7 @@ def diagnose(
     """Say where logs and model disagree, and which effect is missing."""
     results = Results(
         out or _default(dataset, "diagnosis"),
-        ("model.toml", "trials.toml", "next.csv", "report.html", "diagnosis.json"),
+        ("model.toml", "trials.toml", "next.csv", DRAFT, "report.html", "diagnosis.json"),
     )
     _check_apart(results, dataset)
     results.check(force, resume)
@@ -223,6 +227,12 @@ def diagnose(
             files["next.csv"] = proposed_file(
                 diagnosis.next_experiment.trial, trials, initial_model
             )
+        draft = results.folder / DRAFT
+        if str(draft.resolve()) in os.environ.get(NAMED, "").split(os.pathsep):
+            # The model may have its effect, as its user has changed it.
+            files[DRAFT] = draft.read_bytes()
+        elif diagnosis.draft:
+            files[DRAFT] = diagnosis.draft.encode()
         results.write(files)
     from pma_gym.discovery.report.summary import diagnosis_summary
 

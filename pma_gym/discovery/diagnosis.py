@@ -49,8 +49,7 @@ class Diagnosis:
         gap: by column name, over all trials; of slides and joints that of predictions a
             short time ahead.
         candidates: the whole catalogue, the likeliest first.
-        next_experiment: what to measure next, where that would tell more; None for slides and
-            joints.
+        next_experiment: what to measure next, where that would tell more.
         model: the amended model.
         given: the model as it was given.
         not_identifiable: paths of parameters that these data do not determine, with the reason.
@@ -59,8 +58,10 @@ class Diagnosis:
             are none, or where they leave too much for their size to mean anything.
         law: the residual law, where the verdict is `unknown` or the law of an effect approximate,
             and one explains enough.
+        draft: where such a law was found in a slide or joint, a Python file with it as a user
+            effect; not written to the JSON.
         tones: where the verdict is `unknown`, the frequency (Hz) at which a signal's residual
-            oscillates, for those that do.
+            oscillates, for those that do; of a slide or joint, what acts on it.
         floors: noise by column name.
         nuisances: mains lines, drifts and coloured noise in the readings.
         adequacy: what is left of each signal, by its column.
@@ -91,6 +92,7 @@ class Diagnosis:
     not_detectable: tuple[str, ...] = ()
     approximate: Approximate | None = None
     law: ResidualLaw | None = None
+    draft: str = ""
     tones: Mapping[str, float] = field(default_factory=dict)
     floors: Mapping[str, Floor] = field(default_factory=dict)
     nuisances: tuple[Nuisance, ...] = ()

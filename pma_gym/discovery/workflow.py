@@ -5,6 +5,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+from pma_gym.codegen.cache.compile_cache import source_digest
 from pma_gym.codegen.threads.thread_pool import linear_algebra_alone
 from pma_gym.data.datasets.dataset import Dataset, NamedTrial
 from pma_gym.data.trial import Trial
@@ -75,10 +76,9 @@ def diagnose(
         seed: of simulated chance.
         jobs: how many threads simulate.
         journal: a folder in which finished fits are kept, from which an interrupted diagnosis goes
-            on; None keeps nothing. Slides and joints keep none.
+            on; None keeps nothing.
         progress: called with a step's name, what is done of it and its total.
-        propose: whether to look for the next experiment too, which takes seconds; slides and joints
-            have none.
+        propose: whether to look for the next experiment too, which takes seconds.
         checks: whether a column of a data set that is certainly in another unit is refused; else it
             is only said.
     Returns:
@@ -198,7 +198,17 @@ class _Work:
         every = _candidates(given, named) if search else None
         logged = [Logged.of(given, i, each.trial) for i, each in enumerate(named)]
         _check_size(logged, free_parameters(given).free)
-        options = dataset.tolerance, self.seed, self._tell, self.jobs
+        # Whatever a fit or a filter is computed by may be of another version.
+        question = f"likelihood of version {source_digest()}"
+        journal = Journal(self.folder, [each.trial for each in named], given, question)
+        options = (
+            dataset.tolerance,
+            self.seed,
+            self._tell,
+            self.jobs,
+            journal,
+            self.propose and search,
+        )
         return self._timed("grey box", lambda: answered(given, named, every, *options))
 
     def _problem(

@@ -256,6 +256,28 @@ class Diagnose(Command):
         return contents
 
 
+class DiagnoseJoint(Diagnose):
+    """The same on a joint with dry friction that its model lacks."""
+
+    name = "diagnose joint"
+
+    def prepare(self) -> None:
+        """Three trials of 2 s of another simulator."""
+        from pma_gym.data.files.trial_files import write_trial
+        from pma_gym.plant.model import dump_model
+        from tests.discovery.grey_box.test_free_rigs import logs, model
+
+        lab = self.folder / "lab"
+        lab.mkdir()
+        (self.folder / "joint.toml").write_text(dump_model(model("joint")))
+        for number, trial in enumerate(logs("joint", 2.0)):
+            write_trial(trial, lab / f"swing_{number}.csv")
+
+    def arguments(self) -> list[str]:
+        """With the model of its data sheet."""
+        return [*super().arguments(), "--model", str(self.folder / "joint.toml")]
+
+
 def timeless(value: Any) -> Any:  # noqa: ANN401
     """A JSON value without what depends on the moment or the speed of its making."""
     if isinstance(value, dict):
@@ -263,5 +285,5 @@ def timeless(value: Any) -> Any:  # noqa: ANN401
     return [timeless(each) for each in value] if isinstance(value, list) else value
 
 
-COMMANDS = {one.name: one for one in (Run, Train, HiddenEffects, Diagnose)}
+COMMANDS = {one.name: one for one in (Run, Train, HiddenEffects, Diagnose, DiagnoseJoint)}
 """All commands by name."""

@@ -59,10 +59,11 @@ def proposed_file(trial: Trial, dataset: Dataset, model: Model) -> bytes:
 def from_rest(trial: Trial, model: Model) -> Trial:
     """An experiment with the way from no load to its first commands before it.
 
-    The same experiment where it begins without load, or where the model cannot rest without load.
+    The same experiment where it begins without load, or where the model cannot rest without load,
+    as a free rig never does.
     """
     motor = trial.commands.get("motor_voltage")
-    if motor is None or float(motor[0]) == 0.0:
+    if model.rig.is_free or motor is None or float(motor[0]) == 0.0:
         return trial
     first = float(motor[0])
     way = max(LEAST_WAY_S, FULL_RANGE_S * first / VOLTAGE_RANGE[1])

@@ -6,8 +6,12 @@ from pma_gym.data.datasets.dataset import NamedTrial
 from pma_gym.data.trial_columns import BY_QUANTITY
 from pma_gym.discovery.diagnosis import Diagnosis
 from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
+from pma_gym.discovery.fitting.journal import Journal
 from pma_gym.discovery.grey_box.conclusions import Conclusions, path_of
 from pma_gym.discovery.grey_box.effect_selection import EffectSelection
+from pma_gym.discovery.grey_box.kept_fits import kept_in
+from pma_gym.discovery.grey_box.latent_law import drafted_effect
+from pma_gym.discovery.grey_box.next_trial import next_trial
 from pma_gym.discovery.grey_box.sentence import sentence
 from pma_gym.discovery.grey_box.thresholds import (
     MATERIAL,
@@ -22,8 +26,9 @@ from pma_gym.plant.model import Model
 from pma_gym.units import SI_FACTORS
 
 
-def diagnosis(conclusions: Conclusions) -> Diagnosis:
-    """The answer with its conclusions."""
+def diagnosis(conclusions: Conclusions, propose: bool) -> Diagnosis:
+    """The answer with its conclusions, and the next experiment where one is to be proposed."""
+    following, none_helps = next_trial(conclusions) if propose else (None, "")
     base, last = conclusions.path[0], conclusions.last
     named = conclusions.verdict == "effect"
     floors = {}
@@ -43,18 +48,24 @@ def diagnosis(conclusions: Conclusions) -> Diagnosis:
         parameters=conclusions.parameters,
         gap=conclusions.gap,
         candidates=(),
-        next_experiment=None,
+        next_experiment=following,
         model=conclusions.model,
         given=conclusions.selection.model,
         approximate=Approximate(conclusions.effects, conclusions.left, conclusions.holds_out(last))
         if approximate
         else None,
         law=conclusions.law if conclusions.verdict == "unknown" or approximate else None,
+        draft=drafted_effect(conclusions.law, conclusions.selection.model.rig)
+        if conclusions.verdict == "unknown" and conclusions.law
+        else "",
+        tones={conclusions.selection.model.plant: conclusions.line[0]}
+        if conclusions.verdict == "unknown" and conclusions.line
+        else {},
         floors=floors,
         states=conclusions.states,
         trials=conclusions.records,
         steps=_steps(conclusions),
-        warnings=(WORSE,) if conclusions.is_worse else (),
+        warnings=(*([WORSE] if conclusions.is_worse else []), *filter(None, [none_helps])),
     )
 
 
@@ -94,7 +105,9 @@ def answered(
     tolerance: Mapping[str, float],
     seed: int,
     tell: Callable[[str, int, int], None],
-    threads: int = 1,
+    threads: int,
+    journal: Journal,
+    propose: bool,
 ) -> Diagnosis:
     """The diagnosis of a free rig.
 
@@ -106,6 +119,8 @@ def answered(
         seed: of the starts of fits.
         tell: called with a step's name, what is done of it and its total.
         threads: that filters run in at once.
+        journal: keeps fits.
+        propose: whether to look for the next experiment too.
     Raises:
         TrialError: trials with fewer readings than a fit needs.
     """
@@ -113,10 +128,12 @@ def answered(
     selection = EffectSelection(
         model, logged, candidates or (), seed=seed, tell=tell, threads=threads
     )
-    path = [selection.base()] if candidates is None else selection.run()
-    tell("putting the answer together", 0, 1)
     limits = {
         BY_QUANTITY[name].name: value / SI_FACTORS[BY_QUANTITY[name].unit]
         for name, value in tolerance.items()
     }
-    return diagnosis(Conclusions(selection, path, named, limits, candidates or ()))
+    with kept_in(journal):
+        path = [selection.base()] if candidates is None else selection.run()
+        tell("putting the answer together", 0, 1)
+        conclusions = Conclusions(selection, path, named, limits, candidates or ())
+        return diagnosis(conclusions, propose)

@@ -16,7 +16,8 @@ from pma_gym.discovery.answer.trial_records import gaps
 from pma_gym.discovery.diagnosis import Verdict
 from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
 from pma_gym.discovery.grey_box.effect_selection import EffectSelection, Hypothesis, Move, slot
-from pma_gym.discovery.grey_box.latent_law import latent_force, latent_law
+from pma_gym.discovery.grey_box.kept_fits import fit
+from pma_gym.discovery.grey_box.latent_law import latent_force, latent_law, latent_line
 from pma_gym.discovery.grey_box.thresholds import (
     COMPLETE,
     CONFIDENCE,
@@ -35,7 +36,7 @@ from pma_gym.discovery.result.estimates import Estimate, Moved, NamedEffect, Tri
 from pma_gym.discovery.result.misfit import Gap, ResidualLaw, TrialRecord
 from pma_gym.effects import CATALOGUE
 from pma_gym.estimation.innovations import TREND, TRIAL, GreyBox, counted, predictions
-from pma_gym.estimation.likelihood_fit import fit, value_of, with_tied, with_values
+from pma_gym.estimation.likelihood_fit import value_of, with_tied, with_values
 from pma_gym.estimation.smoother import Smoothed, smoothed
 from pma_gym.plant.model import Model
 from pma_gym.units import SI_FACTORS, Quantity
@@ -122,6 +123,8 @@ class Conclusions:
         count = len(self.named)
         out: list[Array] = [np.empty(0)] * count
         for fold in range(min(FOLDS, count)):
+            done, total = FOLDS * len(self._curves) + fold, FOLDS * (len(self.path) + 1)
+            self.selection.tell("trials left out", done, total)
             left = [i for i in range(count) if i % FOLDS == fold]
             rows = [
                 counted(trial, np.full(len(trial.time), i not in left))
@@ -483,6 +486,11 @@ class Conclusions:
         base = self.path[0]
         rows = max(1.0, 2.0 * base.fit.point.memory / self.selection.span)
         return latent_law(self.smooth, self.selection.model.rig, rows)
+
+    @cached_property
+    def line(self) -> tuple[float, float] | None:
+        """Frequency (Hz) at which a force without a law oscillates, and the share of that."""
+        return None if self.law else latent_line(self.smooth)
 
     @cached_property
     def states(self) -> dict[str, TrialState]:

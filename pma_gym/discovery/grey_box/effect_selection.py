@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
 from pma_gym.discovery.fitting.free_parameters import free_parameters, prior
+from pma_gym.discovery.grey_box.kept_fits import fit
 from pma_gym.discovery.grey_box.thresholds import (
     FAINT,
     LIKE,
@@ -33,7 +34,6 @@ from pma_gym.estimation.likelihood_fit import (
     STEP,
     Coordinate,
     Fit,
-    fit,
     value_of,
     with_tied,
     with_values,
@@ -80,6 +80,13 @@ STARTS, SMOOTH_STARTS = 8, 3
 
 BEAM, BESIDE = 3, 3
 """Hypotheses that a stage hands on, and moves that each but the likeliest is extended by."""
+
+COST, AFTER = 3, 1.5
+"""For the time left.
+
+What an effect's fits take, in those of a parameter by trial; the same for fits that begin far off,
+in others. What a stage takes, in its moves' fits.
+"""
 
 MOST_TRIALS = 6
 """With so many trials at most, each is once taken for an odd one.
@@ -228,6 +235,7 @@ class EffectSelection:
         longest = max(float(each.time[-1] - each.time[0]) for each in logged)
         self.memory = 4.0 * self.span, max(longest / 5.0, 8.0 * self.span)
         self.gains: dict[str, float] = {}
+        self.fitted: dict[frozenset[str], Hypothesis] = {}
         self.noise = [n / self.block**0.5 for n in self.noise]
         self._rows: dict[tuple[int, bool], list[Rows]] = {}
         self.force = self._force()
@@ -364,7 +372,8 @@ class EffectSelection:
 
         def start(k: int, odd: int) -> None:
             for linear in kinds:
-                self.tell("refitting parameters", k, count)
+                # It may end after three: between that and all, until then.
+                self.tell("refitting parameters", k, count + 2 if k > 3 else (count + 3) // 2)
                 box = self.box(self.model, linear)
                 fits[linear].append(
                     fit(box, self._begin(box, coordinates, tied, k, odd), coordinates, tied)
@@ -847,19 +856,23 @@ class EffectSelection:
         best, beam = [base], [[base]]
         for stage in range(MOST_EFFECTS):
             tried = self._extended(beam, f"effect {stage + 1}")
+            self._keep(tried)
             if not tried or self._lead(tried[0], best) < 0.0:
                 break
             bent = self._is_bent(tried[0][-1], MATERIAL)
             for at, chain in enumerate(tried[: 2 if bent else 1]):
+                self.tell(f"effect {stage + 1}", self.planned * (4 + at) // 6, self.planned)
                 *before, last = chain
                 again = self.tried(before[-1], last.moves[-1], careful=True)
                 if again.fit.value > last.fit.value:
                     tried[at] = [*before, again]
             tried.sort(key=self._worth, reverse=True)
+            self.tell(f"effect {stage + 1}", self.planned * 5 // 6, self.planned)
             # Others begin where the likeliest one ended: no start is ahead.
             for at, (*before, last) in enumerate(tried[1:BEAM], 1):
                 tried[at] = [*before, self._again(last, tried[0][-1])]
             tried.sort(key=self._worth, reverse=True)
+            self._keep(tried)
             *before, now, last = tried[0]
             chain = [*before, self._again(now, last), last]
             if len(chain) == 2:
@@ -881,6 +894,19 @@ class EffectSelection:
                 beam += [c for c in tried[1:BEAM] if self._lead(c, c[:-1]) > 0.0]
         return best
 
+    def _cost(self, now: Hypothesis, move: Move) -> int:
+        """How long a move's fits take, in those of a parameter by trial."""
+        if move.candidate is None:
+            return 1
+        larger = move.candidate.beside(now.box.model)
+        finer = self.substeps[is_rough(now.box.model)] / self.substeps[is_rough(larger)]
+        return round(finer * (COST if move.start is None else COST**2))
+
+    def _keep(self, tried: Sequence[Sequence[Hypothesis]]) -> None:
+        """Keep what was fitted last by what was added, the likeliest of each."""
+        for *_, last in reversed(tried):
+            self.fitted[frozenset(move.name for move in last.moves)] = last
+
     def _worth(self, chain: Sequence[Hypothesis]) -> float:
         """Log likelihood of a chain's last hypothesis, less its price."""
         return chain[-1].fit.value - self.price(chain[-1], chain[0])
@@ -891,18 +917,23 @@ class EffectSelection:
     def _extended(self, beam: Sequence[list[Hypothesis]], step: str) -> list[list[Hypothesis]]:
         """Every chain with each of its most promising moves, the likeliest for its price first."""
         seen, tried = set[tuple[frozenset[str], bool]](), list[list[Hypothesis]]()
-        for rank, chain in enumerate(beam):
+        plans = [
+            (chain, move)
+            for rank, chain in enumerate(beam)
+            for move in self._worth_a_fit(chain[-1])[: BESIDE if rank else None]
+        ]
+        costs = np.cumsum([0, *(self._cost(chain[-1], move) for chain, move in plans)])
+        self.planned = int(AFTER * costs[-1])
+        for (chain, move), done in zip(plans, costs.tolist(), strict=False):
             now = chain[-1]
-            moves = self._worth_a_fit(now)
-            for number, move in enumerate(moves if not rank else moves[:BESIDE]):
-                key = frozenset(each.name for each in (*now.moves, move)), move.start is not None
-                if key in seen:
-                    continue
-                seen.add(key)
-                self.tell(step, number, len(moves))
-                larger = self.tried(now, move)
-                self.gains.setdefault(move.name, larger.fit.value - now.fit.value)
-                tried += [[*chain, larger]] if not self._at_end(larger) else []
+            key = frozenset(each.name for each in (*now.moves, move)), move.start is not None
+            if key in seen:
+                continue
+            seen.add(key)
+            self.tell(step, done, self.planned)
+            larger = self.tried(now, move)
+            self.gains.setdefault(move.name, larger.fit.value - now.fit.value)
+            tried += [[*chain, larger]] if not self._at_end(larger) else []
         return sorted(tried, key=self._worth, reverse=True)
 
 

@@ -1,24 +1,35 @@
-"""What the smoothed latent force goes with, and in which trial it acts most."""
+"""What the smoothed latent force goes with, in which trial it acts most, and a draft of its law."""
 
 from collections.abc import Sequence
+from itertools import product
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pma_gym.data.trial_columns import BY_QUANTITY, Column
-from pma_gym.discovery.grey_box.thresholds import CONFIDENCE
-from pma_gym.discovery.report.figure_text import percent, signal_name
+from pma_gym.discovery.grey_box.thresholds import CONFIDENCE, LEFT
+from pma_gym.discovery.report.figure_text import capitalised, percent, signal_name
 from pma_gym.discovery.result.misfit import LatentForce, ResidualLaw
+from pma_gym.estimation.innovations import PORTS
 from pma_gym.estimation.smoother import Smoothed
 from pma_gym.plant.model import Model
 from pma_gym.plant.rigs.rig import Rig
 from pma_gym.plant.sensors import direct_command
 from pma_gym.units import SI_FACTORS
 
+Array = NDArray[np.float64]
+
 FORCES = {"slide": ("force on the slide", "N"), "joint": ("torque on the joint", "N m")}
 """What a latent force is, and its unit, by rig."""
 
-BINS, LEAST_BINS = 12, 3
+BINS, LEAST_BINS = (12, 36), 3
 """Of a law that is drawn from the smoothed force, and the fewest that make one."""
+
+PARTS = 6
+"""Of a single trial, each of which is left out once."""
+
+PERIODS, FINER = 3.0, 4
+"""Of a line in the shortest trial at least; points of its spectrum within its width."""
 
 
 def latent_law(trials: Sequence[Smoothed], rig: Rig, rows: float) -> ResidualLaw | None:
@@ -29,15 +40,19 @@ def latent_law(trials: Sequence[Smoothed], rig: Rig, rows: float) -> ResidualLaw
         rig: a slide or a joint.
         rows: that count as one independent value: two memories of the force.
     Returns:
-        Means with 95 % bands; None where neither position nor speed varies.
+        Means with 95 % bands; None where neither explains most of the mean square.
     """
     force = np.concatenate([each.force for each in trials])
     columns = [BY_QUANTITY[signal.name] for signal in rig.signals[:2]]
     values = [[each.position for each in trials], [each.speed for each in trials]]
+    sizes = [len(each.force) for each in trials]
+    part = np.repeat(np.arange(len(sizes)), sizes)
+    if len(sizes) == 1:
+        part = np.arange(sizes[0]) * PARTS // sizes[0]
     best = None
-    for column, parts in zip(columns, values, strict=True):
+    for (column, parts), most in product(zip(columns, values, strict=True), BINS):
         x = np.concatenate(parts)
-        edges = np.unique(np.quantile(x, np.linspace(0.0, 1.0, BINS + 1)))
+        edges = np.unique(np.quantile(x, np.linspace(0.0, 1.0, most + 1)))
         bins = len(edges) - 1
         if bins < LEAST_BINS:
             continue
@@ -45,16 +60,23 @@ def latent_law(trials: Sequence[Smoothed], rig: Rig, rows: float) -> ResidualLaw
         count = np.maximum(np.bincount(of, minlength=bins), 1)
         mean = np.bincount(of, force, bins) / count
         off = (force - mean[of]) ** 2
-        explained = 1.0 - float(np.mean(off)) / max(float(np.mean(force**2)), 1e-300)
+        # By the other trials alone, or the other parts of one: no force that goes with time does.
+        counts, sums = (
+            np.bincount(part * bins + of, weights, (part[-1] + 1) * bins).reshape(-1, bins)
+            for weights in (np.ones(len(x)), force)
+        )
+        others = (sums.sum(axis=0) - sums) / np.maximum(counts.sum(axis=0) - counts, 1.0)
+        unseen = force - others[part, of]
+        explained = 1.0 - float(np.mean(unseen**2)) / max(float(np.mean(force**2)), 1e-300)
         spread = np.sqrt(np.bincount(of, off, bins) / count / np.maximum(count / rows, 1.0))
         at = 0.5 * (edges[:-1] + edges[1:]) / SI_FACTORS[column.unit]
         if best is None or explained > best[0]:
             best = explained, column, at, mean, CONFIDENCE * spread
-    if best is None:
+    if best is None or best[0] < 1.0 - LEFT:
         return None
     explained, column, at, mean, wide = best
     what, unit = FORCES[rig.name]
-    share = percent(max(explained, 0.0))
+    share = percent(explained)
     words = f"goes with {signal_name(column.name)}: that explains {share} of its mean square"
     return ResidualLaw(
         f"{what} ({unit})", _label(column), at, mean, mean - wide, mean + wide, words
@@ -87,3 +109,63 @@ def largest_share(trials: Sequence[Smoothed]) -> tuple[int, float]:
     squares = np.array([float(np.sum(each.force**2)) for each in trials])
     largest = int(np.argmax(squares))
     return largest, float(squares[largest] / max(float(squares.sum()), 1e-300))
+
+
+def latent_line(trials: Sequence[Smoothed]) -> tuple[float, float] | None:
+    """Frequency (Hz) of the line that carries most of the force's variance, and its share.
+
+    None where no line does, or where the rig itself moves at that frequency: then it goes with the
+    motion.
+    """
+    step = float(np.median(np.concatenate([np.diff(each.time) for each in trials])))
+    padded = FINER * max(len(each.time) for each in trials)
+    shortest = min(float(each.time[-1] - each.time[0]) for each in trials)
+    hertz = np.fft.rfftfreq(padded, step)
+
+    def peak(rows: Sequence[Array]) -> tuple[float, float]:
+        power, total = np.zeros(len(hertz)), 0.0
+        for each, row in zip(trials, rows, strict=True):
+            even = np.interp(np.arange(each.time[0], each.time[-1], step), each.time, row)
+            even -= even.mean()
+            power += 2.0 / len(even) * np.abs(np.fft.rfft(even, padded)) ** 2
+            total += float(even @ even)
+        at = int(np.argmax(power * (hertz > PERIODS / shortest)))
+        return float(hertz[at]), float(power[at]) / max(total, 1e-300)
+
+    line, share = peak([each.force for each in trials])
+    motion, moved = peak([each.position for each in trials])
+    if share < LEFT or moved > LEFT and abs(line - motion) < 1.0 / shortest:
+        return None
+    return line, share
+
+
+def drafted_effect(law: ResidualLaw, rig: Rig) -> str:
+    """A Python file with a law as a user effect, whose share is fitted."""
+    of = {_label(column): column for column in (BY_QUANTITY[s.name] for s in rig.signals[:2])}
+    column = of[law.variable]
+    signal = "spin" if column.quantity == "speed" else column.quantity
+    title = f"{capitalised(law.quantity)} over {law.variable}"
+    at = tuple(float(f"{x * SI_FACTORS[column.unit]:.6g}") for x in law.at)
+    values = tuple(float(f"{y:.6g}") for y in law.law)
+    return f'''"""{title}, drafted from the smoothed latent force."""
+
+from typing import Annotated, NamedTuple
+
+from pma_gym.effects import Effect
+from pma_gym.effects.arithmetic import interp
+from pma_gym.units import Quantity
+
+AT = {at}
+FORCE = {values}
+
+
+class Drafted(NamedTuple):
+    share: Annotated[float, Quantity("%", 0, 1000, "100: as drafted", neutral=0.0, usual=100.0)]
+
+
+def drafted({signal}, p):
+    return p.share * interp({signal}, AT, FORCE)
+
+
+DRAFTED = Effect("drafted", "{PORTS[rig.name]}", Drafted, drafted, signature="{law.words}")
+'''

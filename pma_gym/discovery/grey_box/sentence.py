@@ -34,6 +34,9 @@ def sentence(conclusions: Conclusions) -> str:
         return f"{named} missing{rest}: {_misses(conclusions)}{approximate}."
     if conclusions.verdict == "unknown":
         words = f" It {conclusions.law.words}." if conclusions.law else ""
+        if conclusions.line:
+            hertz, of = conclusions.line
+            words += f" It oscillates at {figure(hertz)} Hz: {percent(of)} of its variance."
         names = effect_names([each.name for each in conclusions.effects])
         best = f" Best candidate: {names}, which leaves {percent(conclusions.left)} of it."
         number, share = largest_share(conclusions.smooth)

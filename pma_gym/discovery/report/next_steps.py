@@ -73,10 +73,14 @@ def _describe(diagnosis: Diagnosis) -> list[str]:
             "Log at rest, repeat a trial, check the clock and look for play: what changes tells "
             "where it comes from.",
         ]
-    return [
-        *steps,
-        "Write it as a user effect, one Python file, and diagnose again with `--effect FILE.py`.",
-    ]
+    drafted = (
+        "Diagnose again with `--effect` and `proposed_effect.py` beside this page, which has it as "
+        "a user effect; then make its law what you think acts."
+    )
+    write = (
+        "Write it as a user effect, one Python file, and diagnose again with `--effect FILE.py`."
+    )
+    return [*steps, drafted if diagnosis.draft else write]
 
 
 def _measure(diagnosis: Diagnosis) -> list[str]:

@@ -8,8 +8,9 @@ import pytest
 from pma_gym.data.datasets.dataset import read_dataset
 from pma_gym.data.files.trial_files import read_trial
 from pma_gym.data.trial import Trial
-from pma_gym.discovery.experiments.command_file import proposed_file
+from pma_gym.discovery.experiments.command_file import from_rest, proposed_file
 from pma_gym.plant.plant import Plant
+from tests.discovery.grey_box import test_free_rigs
 from tests.discovery.preparation.data_checks.logs import GIVEN, log, write
 
 TOML = """[columns]
@@ -79,3 +80,8 @@ def test_a_lab_of_volts_gets_volts(tmp_path):
     dataset = read_dataset(write(tmp_path / "lab", [written]))
     text = proposed_file(experiment(), dataset, GIVEN).decode()
     assert text.splitlines()[0] == "time_s,motor_voltage_v,regulator_voltage_v"
+
+
+def test_a_slide_has_no_rest_without_its_command():
+    trial = experiment()
+    assert from_rest(trial, test_free_rigs.model("slide")) is trial

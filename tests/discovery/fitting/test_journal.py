@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 
 from pma_gym.data.trial import Trial
+from pma_gym.discovery import workflow
 from pma_gym.discovery.fitting.journal import Journal, JournalWarning, digest
 from pma_gym.discovery.selection.candidate_fits import refit
 from pma_gym.discovery.workflow import diagnose
+from tests.discovery.grey_box import test_free_rigs
 from tests.discovery.laboratory import OFF, STATION, diagnosed, fit_problem, laboratory
 
 SMALL = ("hysteresis", 2, 32.0)
@@ -47,6 +49,34 @@ def test_neither_jobs_nor_a_journal_nor_an_interrupt_change_a_byte(
     whole.append(diagnose(trials, STATION, journal=tmp_path, propose=False).text())
     assert whole == [diagnosed(*SMALL).text()] * 2
     assert {path.name: path.stat().st_mtime_ns for path in tmp_path.iterdir()} == times
+
+
+def test_fits_of_an_interrupted_joint_are_restored_bit_for_bit_and_damaged_ones_made_anew(tmp_path):
+    asked = test_free_rigs.logs("joint", 1.0), test_free_rigs.model("joint")
+
+    def progress(name, number, total):
+        if number == 2:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        workflow.refit(*asked, journal=tmp_path, progress=progress)
+    left, whole = contents(tmp_path), workflow.refit(*asked).text()
+    assert workflow.refit(*asked, journal=tmp_path).text() == whole
+    assert left and left.items() < contents(tmp_path).items()
+    for (name, content), damage in zip(left.items(), DAMAGES, strict=False):
+        (tmp_path / name).write_text(json.dumps(damage(json.loads(content))))
+    with pytest.warns(JournalWarning):
+        assert workflow.refit(*asked, journal=tmp_path).text() == whole
+    assert left.items() < contents(tmp_path).items()
+
+
+DAMAGES = [
+    lambda entry: entry | {"values": entry["values"][1:]},
+    lambda entry: entry | {"values": [None, *entry["values"][1:]]},
+    lambda entry: entry | {"scores": entry["values"]},
+    lambda entry: entry | {"information": [[float("nan")] * len(entry["values"])]},
+    lambda entry: entry | {"value": float("nan")},
+]
 
 
 @pytest.mark.parametrize("broken", [b"", b"{", b"[]", b"\xff\xfe", b"null"])

@@ -3,7 +3,9 @@
 import re
 import subprocess
 import sys
+from dataclasses import replace
 from functools import cache
+from math import exp
 from pathlib import Path
 
 import numpy as np
@@ -13,9 +15,11 @@ from pma_gym import Plant
 from pma_gym.data.datasets.dataset import read_dataset
 from pma_gym.data.trial import Trial
 from pma_gym.discovery import diagnose
+from pma_gym.discovery.grey_box.latent_law import latent_law, latent_line
 from pma_gym.effects import CATALOGUE
+from pma_gym.effects.user_effects import load_effects
 from pma_gym.estimation.innovations import Point
-from pma_gym.estimation.smoother import smoothed
+from pma_gym.estimation.smoother import Smoothed, smoothed
 from pma_gym.plant.model import Model
 from tests.estimation.linear_slide import box
 
@@ -29,11 +33,13 @@ RIGS = {
 """Each in SI."""
 
 
-def logs(plant, seconds=4.0, begin=0.0, friction=(1.0, 1.0, 1.0), gain=(1.0, 1.0, 1.0), seed=1):
+def logs(
+    plant, seconds=4.0, begin=0.0, friction=(1.0, 1.0, 1.0), gain=(1.0, 1.0, 1.0), seed=1, bump=0.0
+):
     """Three trials of a rig that a controller moves along sums of sines, from a time on.
 
     Friction and gain of each trial are in shares of the rig's own. Friction is an impulse that at
-    most stops the rig.
+    most stops the rig. A bump of force lies about 0.2 m or rad.
     """
     inertia, damping, dry, (stiffness, rate_gain), size, noise, command, reading = RIGS[plant]
     generator, trials, step = np.random.default_rng(seed), [], 1.0 / RATE_HZ / SUBSTEPS
@@ -57,7 +63,8 @@ def logs(plant, seconds=4.0, begin=0.0, friction=(1.0, 1.0, 1.0), gain=(1.0, 1.0
             forces.append(force)
             for _ in range(SUBSTEPS):
                 former = speed
-                speed += kick * (gain[k] * force - damping * speed)
+                hill = bump * exp(-50.0 * (position - 0.2) ** 2)
+                speed += kick * (gain[k] * force - damping * speed + hill)
                 speed -= min(max(speed, -most), most)
                 position += 0.5 * step * (former + speed)
         cut = slice(round(begin * RATE_HZ), None)
@@ -255,3 +262,77 @@ def test_an_inertia_far_from_the_data_sheet_is_said_and_what_to_write_helps():
     share = float(said[1]) / RIGS["joint"][0]
     again = diagnose(trials, model("joint", inertia=share, presliding=NEAR["joint"]))
     assert again.verdict in ("agrees", "parameters") and not again.effects, again.sentence
+
+
+def swing(trial, noise_deg, seed):
+    """A trial of a weight on an arm, and its model without the weight."""
+    known = model("joint", inertia=1.0).replace({"encoder.noise_deg": noise_deg})
+    plant = Plant(known.with_effects({"joint_weight": {"moment_n_m": 0.4, "offset_deg": 0.0}}))
+    read = plant.simulate(trial, seed=seed).measurements["angle"]
+    return replace(trial, measurements={"angle": read}), known
+
+
+def swings(tones, size, noise_deg):
+    """Two trials under sums of sines, and the model without the weight."""
+    time, phases = np.arange(400) / RATE_HZ, np.random.default_rng(0).uniform(0.0, 6.0, (2, 3, 1))
+    waves = np.sin(6.283 * np.outer(tones, time) + phases) - np.sin(phases)
+    pulls = [Trial(time, {"torque_command": size * wave.sum(axis=0)}) for wave in waves]
+    trials, models = zip(*(swing(pull, noise_deg, k) for k, pull in enumerate(pulls)), strict=True)
+    return trials, models[0]
+
+
+def test_the_proposed_trial_tells_a_weight_from_a_spring_that_small_swings_do_not():
+    trials, known = swings((2.1, 3.3, 5.0), 0.06, 0.3)
+    first = diagnose(trials, known)
+    following, rivals = first.next_experiment, {"joint_weight", "joint_spring"}
+    assert {first.effects[0].name, *first.effects[0].confused_with} == rivals
+    assert set(following.separates) == rivals and following.expected_odds > 1e5
+    within = np.concatenate([each.commands["torque_command"] for each in trials])
+    proposed = following.trial.commands["torque_command"]
+    assert within.min() <= proposed.min() and proposed.max() <= within.max()
+    assert proposed[0] == proposed[-1] == 0.0 and following.minutes < 1.0
+    (decided,) = diagnose([*trials, swing(following.trial, 0.3, 9)[0]], known).effects
+    assert (decided.name, decided.confused_with) == ("joint_weight", ())
+    assert decided.parameters["moment_n_m"].value == pytest.approx(0.4, rel=0.01)
+
+
+@pytest.mark.campaign
+def test_where_no_trial_within_the_commands_of_the_logs_decides_that_is_said():
+    diagnosis = diagnose(*swings((0.8, 1.4, 2.0), 0.003, 0.1))
+    assert diagnosis.effects[0].confused_with and diagnosis.next_experiment is None
+    assert "joint spring apart; larger commands, another load or" in diagnosis.warnings[0]
+
+
+@pytest.mark.usefixtures("forget_user_effects")
+def test_a_torque_that_no_effect_has_is_drafted_as_a_user_effect_which_closes_the_gap(tmp_path):
+    trials = logs("joint", 2.0, friction=(0.0, 0.0, 0.0), bump=0.2)
+    first = diagnose(trials, known := model("joint", inertia=1.0))
+    assert first.verdict == "unknown" and "goes with angle" in first.sentence, first.sentence
+    # The law is the bump, where the joint was.
+    bump = 0.2 * np.exp(-50.0 * (np.radians(first.law.at) - 0.2) ** 2)
+    assert first.law.law == pytest.approx(bump, abs=0.04) and not first.next_experiment
+    (tmp_path / "proposed_effect.py").write_text(first.draft)
+    load_effects(tmp_path / "proposed_effect.py")
+    (effect,) = (again := diagnose(trials, known, propose=False)).effects
+    assert effect.parameters["share_percent"].value == pytest.approx(100.0, abs=20.0)
+    assert again.gap["angle_deg"].after < 0.2 * first.gap["angle_deg"].after
+
+
+@pytest.mark.parametrize(
+    ("force", "goes_with", "hertz"),
+    [
+        (lambda t, x: np.sin(6.283 * 7.3 * t), None, 7.3),
+        (lambda t, x: x**2 - 0.5, "angle (deg)", None),
+        # The motion's own frequency is no line of its own.
+        (lambda t, x: np.sin(6.283 * t + 0.3), None, None),
+        (lambda t, x: np.random.default_rng(3).standard_normal(len(t)), None, None),
+    ],
+)
+def test_a_latent_force_goes_with_a_place_or_oscillates_or_does_neither(force, goes_with, hertz):
+    t, trials = np.arange(500) / RATE_HZ, []
+    for phase in (0.0, 1.0, 2.5):
+        x, speed = np.sin(6.283 * t + phase), 6.283 * np.cos(6.283 * t + phase)
+        trials.append(Smoothed(t, force(t, x), 0.0 * t, x, speed, 0.0 * t))
+    law = latent_law(trials, model("joint").rig, 10.0)
+    assert (law and law.variable) == goes_with
+    assert law or latent_line(trials) == (hertz and pytest.approx((hertz, 1.0), abs=0.1))
