@@ -1,13 +1,15 @@
 """Controllers of any rig: by their model, tuned, trained, and from logs."""
 
 import json
+import sys
 
 import numpy as np
 import pytest
 
 from benchmarks.rigs import from_logs, run, tune
 from benchmarks.rigs.score import run_episode, scores
-from controllers.rigs import RIG_CONTROLLERS, Feedforward, RigLQG, RigPID
+from controllers.rigs import RIG_CONTROLLERS, Feedforward, RigLQG, RigMPC, RigPID
+from controllers.rigs.rig_controller import Lever
 from pma_gym import Plant, Trial
 from pma_gym.data.files.trial_files import write_trial
 from pma_gym.envs import RigEnv
@@ -60,10 +62,37 @@ def test_an_unknown_load_is_left_to_the_feedback(late):
         "contraction_steps", load=2.0, duration_s=6.0, control_rate_hz=50.0, **options, **late
     )
     errors = {}
-    for controller in (Feedforward({}), RigLQG(RigLQG.settings)):
+    for controller in (Feedforward({}), RigLQG(RigLQG.settings), RigMPC(RigMPC.settings)):
         info, *_ = run_episode(env, controller, 0)
         errors[controller.name] = info["percent_of_range"]
-    assert errors["lqg"] < 0.01 * errors["feedforward"]
+    assert max(errors["lqg"], errors["mpc"]) < 0.01 * errors["feedforward"]
+
+
+def weak(name, command, most):
+    """Options of a rig whose commands reach their limits."""
+    return RIGS[name][0] | {"limits": {command: [-most, most]}}
+
+
+@pytest.mark.parametrize(
+    ("options", "task", "most"),
+    [
+        (RIGS["joint"][0], "angle_multisine", 1.01),
+        (RIGS["slide"][0], "contraction_multisine", 1.01),
+        # Commands reach their limits from here on.
+        (weak("joint", "torque_command", 0.15), "angle_steps", 0.9),
+        (weak("slide", "load_command", 1.0), "contraction_steps", 0.95),
+        (RIGS["station"][0], "contraction_steps", 0.9),
+        ({"model": "muscle_joint"}, "angle_steps", 0.99),
+        ({"model": "muscle_pair"}, "angle_steps", 0.9),
+        ({"model": "valve_pair"}, "angle_steps", 0.9),
+    ],
+)
+def test_looking_ahead_pays_where_commands_reach_their_limits(options, task, most):
+    env = RigEnv(task, **options, duration_s=6.0, control_rate_hz=50.0)
+    errors = [
+        run_episode(env, kind(kind.settings), 0)[0]["percent_of_range"] for kind in (RigLQG, RigMPC)
+    ]
+    assert errors[1] < most * errors[0]
 
 
 def test_a_search_finds_better_settings_and_repeats_itself(monkeypatch):
@@ -159,8 +188,20 @@ def test_a_controller_says_which_rigs_it_is_for(monkeypatch, tmp_path):
     options = RIGS["joint"][0]
     with pytest.raises(ValueError, match="pid does not apply to model arm: no brake"):
         run.chosen_controllers(["pid"], options, ["angle_steps"], tmp_path, Silent())
+    monkeypatch.setattr(Lever, "_effect", lambda self, rig, at: 1e-7)
+    with pytest.raises(ValueError, match="mpc does not apply.*no command moves angle from rest"):
+        run.chosen_controllers(["mpc"], options, ["angle_steps"], tmp_path, Silent())
     with pytest.raises(ValueError, match="a controller of any rig is feedforward, pid"):
         run.chosen_controllers(["pda"], options, ["angle_steps"], tmp_path, Silent())
+
+
+def test_what_does_not_apply_is_left_out_unless_asked_for(monkeypatch, tmp_path, capsys):
+    monkeypatch.setattr(tune, "EVALUATIONS", 4)
+    monkeypatch.setitem(sys.modules, "osqp", None)
+    options = RIGS["joint"][0] | {"duration_s": 0.5, "control_rate_hz": 50.0}
+    made = run.chosen_controllers([], options, ["angle_steps"], tmp_path, Silent())
+    assert set(RIG_CONTROLLERS) - set(made) == {"mpc"}
+    assert "Without mpc: " in (said := capsys.readouterr().out) and "pip install" in said
 
 
 def test_settings_are_kept_for_the_environment_that_they_were_found_on(monkeypatch, tmp_path):
