@@ -12,6 +12,10 @@ from pma_gym.envs import RigInfo
 HORIZON = 25
 """Control periods that are looked ahead."""
 
+LASTING = 0.5
+"""Share of the unknown part that counts at the limits one period further ahead: it is what the
+model gets wrong of this moment, and of another one something else."""
+
 
 class RigMPC(RigLQG):
     """Commands of the coming periods that follow the reference best within the commands' limits.
@@ -20,10 +24,10 @@ class RigMPC(RigLQG):
     along the plan, linear in what its commands become beside it, each command by itself:
 
         min  sum of (e_i / span)^2 + effort^2 / m * |w_i|^2, and the LQG's costs of the last state
-        low <= plan + w - d <= high
+        low <= plan + w - d_i <= high
 
-    with d what takes the estimated unknown force off, m the number of commands. The first ones are
-    sent. If no limit is met, this is the LQG with the reference in its preview.
+    with d_i what takes the estimated unknown force off, m the number of commands. The first ones
+    are sent. If no limit is met, this is the LQG with the reference in its preview.
 
     Source:
         J. B. Rawlings, D. Q. Mayne and M. M. Diehl 2017, "Model predictive control", chapter 1.
@@ -70,8 +74,9 @@ class RigMPC(RigLQG):
         free, acts = np.split(self._foreseen[arrival], [len(off)], axis=1)
         missed = free @ off
         missed[:HORIZON] += self._missed[arrival]
+        lasting = np.repeat(unknown * LASTING ** np.arange(HORIZON), len(planned))
         ends = (np.tile(each, HORIZON) for each in (self._low, self._high))
-        limits = (end - self._planned[arrival] + unknown for end in ends)
+        limits = (end - self._planned[arrival] + lasting for end in ends)
         best = self.program.solve(acts.T @ acts + self._prices, acts.T @ missed, *limits)
         if best is None:
             return super()._moved(arrival, planned, off, unknown)
