@@ -166,6 +166,8 @@ class Uncertainty:
         known = {p: v for e in model.effects for k, v in model.values_in_files(e).items()
                  if (p := f"{e}.{k}") in self.paths}  # fmt: skip
         middle = [known[path] for path in self.paths]
+        if not middle:
+            return model
         drawn = generator.multivariate_normal(middle, self.covariance, method="eigh")
         pairs = zip(self.paths, drawn.tolist(), strict=True)
         return model.replace({path: _bounded(model, path, value) for path, value in pairs})

@@ -133,9 +133,10 @@ def lab(tmp_path):
     (answer / "model.toml").write_text(dump_model(better), encoding="utf-8")
     document = {
         "sentence": "The weight is 0.3 N m.",
-        "effects": [],
-        "parameters": {
-            "joint_weight.moment_n_m": {"from": 0.2, "to": 0.3, "low": 0.28, "high": 0.32}
+        "covariance": {
+            "parameters": ["joint_weight.moment_n_m", "inertia.inertia_kg_m2"],
+            "deviations": [0.01, 1e-4],
+            "correlation": [[1.0, 0.9], [0.9, 1.0]],
         },
         "floors": {"angle_deg": {"value": 0.02, "step": None}},
     }
@@ -177,10 +178,30 @@ def test_logs_become_controllers_and_scores_and_a_second_run_goes_on(lab, monkey
     assert {path: path.stat().st_mtime_ns for path in out.glob("p*")} == kept
 
 
-def test_uncertainty_is_as_wide_as_the_intervals(lab):
-    _, uncertainty = from_logs.amended(lab[1])
-    assert uncertainty.paths == ("joint_weight.moment_n_m",)
-    assert uncertainty.covariance[0][0] ** 0.5 == pytest.approx(0.04 / (2 * 1.96))
+def test_rigs_are_drawn_as_the_fit_correlates_their_parameters(lab):
+    model, uncertainty = from_logs.amended(lab[1])
+    generator = np.random.default_rng(0)
+    drawn = [uncertainty(model, generator).parameters for _ in range(500)]
+    rows = np.array([(each["joint_weight"].moment, each["inertia"].inertia) for each in drawn])
+    assert rows.std(axis=0) == pytest.approx([0.01, 1e-4], rel=0.1)
+    assert np.corrcoef(rows.T)[0, 1] == pytest.approx(0.9, abs=0.03)
+
+
+@pytest.mark.parametrize(
+    ("change", "fault"),
+    [
+        (None, "covariance is missing"),
+        ({"correlation": [[1.0]]}, "correlation must have 2 rows of 2"),
+    ],
+)
+def test_a_diagnosis_without_its_covariance_is_refused(lab, change, fault):
+    file = lab[1] / "diagnosis.json"
+    document = json.loads(file.read_text())
+    kept = document.pop("covariance")
+    document |= {"covariance": kept | change} if change else {}
+    file.write_text(json.dumps(document))
+    with pytest.raises(ValueError, match=f"diagnosis.json: {fault}.*diagnose the logs again"):
+        from_logs.amended(lab[1])
 
 
 def test_a_controller_says_which_rigs_it_is_for(monkeypatch, tmp_path):

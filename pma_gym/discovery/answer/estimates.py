@@ -6,7 +6,7 @@ import numpy as np
 
 from pma_gym.discovery.fitting.fit_problem import SURE, Fitted
 from pma_gym.discovery.fitting.free_parameters import at_limit, unit
-from pma_gym.discovery.result.estimates import Estimate, NamedEffect
+from pma_gym.discovery.result.estimates import Covariance, Estimate, NamedEffect
 from pma_gym.discovery.screening.score_test import ScreeningScore
 from pma_gym.discovery.selection.candidate_fits import LEAST_GAIN
 from pma_gym.discovery.selection.stages import Stage
@@ -106,3 +106,9 @@ def value_and_error(findings: Findings, fit: Fitted, path: str) -> tuple[float, 
     if findings.elimination is not None:
         error = float(np.maximum(error, findings.selection.fit.estimate(path)[1]))
     return value, error
+
+
+def covariance_of(findings: Findings, fit: Fitted) -> Covariance:
+    """Of a fit's parameters, with the standard errors of `value_and_error`."""
+    errors = [value_and_error(findings, fit, path)[1] for path in fit.paths]
+    return Covariance.of(fit.paths, errors, fit.covariance)

@@ -2,11 +2,13 @@
 
 from collections.abc import Callable, Mapping, Sequence
 
+import numpy as np
+
 from pma_gym.data.datasets.dataset import NamedTrial
 from pma_gym.data.trial_columns import BY_QUANTITY
 from pma_gym.discovery.diagnosis import Diagnosis
 from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
-from pma_gym.discovery.grey_box.conclusions import Conclusions, path_of
+from pma_gym.discovery.grey_box.conclusions import Conclusions, path_of, quantity_of
 from pma_gym.discovery.grey_box.effect_selection import EffectSelection
 from pma_gym.discovery.grey_box.sentence import sentence
 from pma_gym.discovery.grey_box.thresholds import (
@@ -14,9 +16,10 @@ from pma_gym.discovery.grey_box.thresholds import (
 )
 from pma_gym.discovery.report.effect_text import effect_name
 from pma_gym.discovery.report.figure_text import figure, listed
-from pma_gym.discovery.result.estimates import Approximate
+from pma_gym.discovery.result.estimates import Approximate, Covariance
 from pma_gym.discovery.result.noise import Floor
 from pma_gym.estimation.innovations import TREND, TRIAL
+from pma_gym.estimation.likelihood_fit import value_of
 from pma_gym.estimation.logged import Logged
 from pma_gym.plant.model import Model
 from pma_gym.units import SI_FACTORS
@@ -46,6 +49,7 @@ def diagnosis(conclusions: Conclusions) -> Diagnosis:
         next_experiment=None,
         model=conclusions.model,
         given=conclusions.selection.model,
+        covariance=covariance_of(conclusions),
         approximate=Approximate(conclusions.effects, conclusions.left, conclusions.holds_out(last))
         if approximate
         else None,
@@ -56,6 +60,30 @@ def diagnosis(conclusions: Conclusions) -> Diagnosis:
         steps=_steps(conclusions),
         warnings=(WORSE,) if conclusions.is_worse else (),
     )
+
+
+def covariance_of(conclusions: Conclusions) -> Covariance:
+    """Of the fitted parameters that the written model has, tied ones as those that they follow."""
+    unknown = conclusions.verdict == "unknown"
+    made = (conclusions.path[0] if unknown else conclusions.last).fit
+    names = [coordinate.name for coordinate in made.coordinates]
+    slots = {**{name: name for name in names}, **made.tied, "drive_delay.delay": "delay"}
+    written, given = set(conclusions.model.paths()), conclusions.selection.model.parameters
+    rows: dict[str, int] = {}
+    errors = []
+    for slot, of in slots.items():
+        effect, _, stem = slot.partition(".")
+        many = any(mark in slot for mark in (TRIAL, TREND, "["))
+        # How far a contact gives before it slides is no parameter that is said.
+        if not stem or many or of not in names or (stem == "presliding" and effect in given):
+            continue
+        if (path := path_of(slot)) in written:
+            quantity, value = quantity_of(slot), value_of(made.point, of)
+            rows[path] = names.index(of)
+            low, high = (quantity.from_si(v) for v in (value, value + made.deviations[of]))
+            errors.append(high - low)
+    at = list(rows.values())
+    return Covariance.of(list(rows), errors, made.curvature[np.ix_(at, at)])
 
 
 WORSE = (

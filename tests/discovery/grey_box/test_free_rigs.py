@@ -171,6 +171,15 @@ def test_dry_friction_that_the_model_lacks_is_named_with_its_size(plant):
     assert sizes[DRY[plant]][SIZE[plant]].value == pytest.approx(RIGS[plant][2], rel=0.05)
     assert inertia_of(diagnosis, plant) == pytest.approx(1.0, rel=0.02)
     assert diagnosis.verdict == "effect" and set(sizes) == {DRY[plant]}, diagnosis.sentence
+    known = diagnosis.covariance
+    static, dynamic = (
+        known.parameters.index(f"{DRY[plant]}.{name}{SIZE[plant].removeprefix('dynamic')}")
+        for name in ("static", "dynamic")
+    )
+    size = sizes[DRY[plant]][SIZE[plant]]
+    assert 3.92 * known.deviations[dynamic] == pytest.approx(size.high - size.low)
+    # Fitted as one number.
+    assert known.correlation[static][dynamic] == pytest.approx(1.0)
 
 
 @pytest.mark.parametrize("presliding_deg", [1.6e-4, 2e-3])
