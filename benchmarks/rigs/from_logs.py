@@ -3,7 +3,7 @@
 import hashlib
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -18,12 +18,12 @@ from controllers.rigs import RIG_CONTROLLERS, RigController
 from pma_gym.cli.terminal import print_table
 from pma_gym.data.datasets.dataset import Dataset, read_dataset
 from pma_gym.data.trial_columns import BY_QUANTITY
-from pma_gym.discovery.diagnosis import Covariance
-from pma_gym.document_shape import check_shape, shape_of
+from pma_gym.discovery.diagnosis import Covariance, RivalModel
+from pma_gym.document_shape import ListOf, check_shape, shape_of
 from pma_gym.pages.document import Block, Heading, Paragraph, to_html
 from pma_gym.plant.model import Model, dump_model, load_model
 from pma_gym.plant.sensors import direct_command
-from pma_gym.tasks import Uncertainty
+from pma_gym.tasks import OneOf, Uncertainty
 
 RATE_HZ = 50.0
 """Control rate."""
@@ -35,23 +35,32 @@ CONTROLLERS = ("feedforward", "pid", "feedforward_pid", "lqg")
 SEEDS = range(5)
 
 
-def amended(folder: Path) -> tuple[Model, Uncertainty]:
-    """The model of a diagnosis with the sensors' noise, and how uncertain its parameters are.
+def amended(folder: Path) -> tuple[Model, OneOf]:
+    """The model of a diagnosis with the sensors' noise, and what it may be in an episode.
+
+    Effects of rivals are in the model and do nothing; every episode draws it or one of them, with
+    parameters as uncertain as the fit has them.
 
     Args:
         folder: of the diagnosis.
 
     Raises:
-        ValueError: `diagnosis.json` has no covariance, or one of another shape.
+        ValueError: `diagnosis.json` lacks covariance or rivals, or has them in another shape.
     """
     file = folder / "diagnosis.json"
     document = json.loads(file.read_text(encoding="utf-8"))
+    model = with_noise(load_model(folder / "model.toml"), document["floors"])
     try:
-        check_shape(document, {"covariance": shape_of(Covariance)})
-        known = uncertainty_of(document["covariance"])
+        check_shape(
+            document, {"covariance": shape_of(Covariance), "rivals": ListOf(shape_of(RivalModel))}
+        )
+        draws = [uncertainty_of(document["covariance"])]
+        for rival in document["rivals"]:
+            model = model.with_effects(rival["absent"])
+            draws.append(replace(uncertainty_of(rival["covariance"]), values=rival["values"]))
     except ValueError as error:
         raise ValueError(f"{file}: {error}; diagnose the logs again") from error
-    return with_noise(load_model(folder / "model.toml"), document["floors"]), known
+    return model, OneOf(draws)
 
 
 def uncertainty_of(covariance: Mapping[str, Any]) -> Uncertainty:

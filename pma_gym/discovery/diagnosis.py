@@ -12,6 +12,7 @@ from pma_gym.discovery.result.estimates import (
     Estimate,
     Moved,
     NamedEffect,
+    RivalModel,
     TrialState,
     Undetermined,
 )
@@ -24,7 +25,7 @@ from pma_gym.plant.model import Model
 __all__ = [
     "Approximate", "Candidate", "Covariance", "Diagnosis", "Estimate", "Floor", "Gap", "Judgement",
     "Map", "Moved", "NamedEffect", "NextExperiment", "Nuisance", "Place", "ResidualLaw",
-    "TrialRecord", "TrialState", "Undetermined", "Verdict",
+    "RivalModel", "TrialRecord", "TrialState", "Undetermined", "Verdict",
 ]  # fmt: skip
 
 SCHEMA = 1
@@ -55,6 +56,7 @@ class Diagnosis:
         model: the amended model.
         given: the model as it was given.
         covariance: of the fitted parameters of the amended model.
+        rivals: models that explain the data as well, as far as they were fitted.
         not_identifiable: paths of parameters that these data do not determine, with the reason.
         not_detectable: effects that these data would not have shown at their usual size.
         approximate: effects whose law is only approximate, and what they leave; None where there
@@ -90,6 +92,7 @@ class Diagnosis:
     model: Model
     given: Model
     covariance: Covariance = field(default_factory=Covariance)
+    rivals: tuple[RivalModel, ...] = ()
     not_identifiable: Mapping[str, str] = field(default_factory=dict)
     not_detectable: tuple[str, ...] = ()
     approximate: Approximate | None = None
@@ -124,6 +127,7 @@ class Diagnosis:
             "approximate": self.approximate and self.approximate.document(),
             "parameters": {path: each.document() for path, each in self.parameters.items()},
             "covariance": vars(self.covariance),
+            "rivals": [rival.document() for rival in self.rivals],
             "gap": {signal: gap.document() for signal, gap in self.gap.items()},
             "candidates": [vars(candidate) for candidate in self.candidates],
             "next_experiment": self.next_experiment and self.next_experiment.document(),

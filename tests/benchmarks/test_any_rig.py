@@ -138,6 +138,7 @@ def lab(tmp_path):
             "deviations": [0.01, 1e-4],
             "correlation": [[1.0, 0.9], [0.9, 1.0]],
         },
+        "rivals": [],
         "floors": {"angle_deg": {"value": 0.02, "step": None}},
     }
     (answer / "diagnosis.json").write_text(json.dumps(document), encoding="utf-8")
@@ -185,6 +186,34 @@ def test_rigs_are_drawn_as_the_fit_correlates_their_parameters(lab):
     rows = np.array([(each["joint_weight"].moment, each["inertia"].inertia) for each in drawn])
     assert rows.std(axis=0) == pytest.approx([0.01, 1e-4], rel=0.1)
     assert np.corrcoef(rows.T)[0, 1] == pytest.approx(0.9, abs=0.03)
+
+
+def test_an_episode_has_the_amended_model_or_a_rival(lab):
+    """The rival has a spring in the place of the weight, and a damping of its own."""
+    file = lab[1] / "diagnosis.json"
+    rival = {
+        "name": "joint_spring",
+        "absent": {"joint_spring": {"stiffness_n_m_per_rad": 0.0, "rest_deg": 0.0}},
+        "values": {"joint_spring.stiffness_n_m_per_rad": 0.4, "joint_weight.moment_n_m": 0.2},
+        "covariance": {
+            "parameters": ["joint_spring.stiffness_n_m_per_rad"],
+            "deviations": [0.01],
+            "correlation": [[1.0]],
+        },
+    }
+    file.write_text(json.dumps(json.loads(file.read_text()) | {"rivals": [rival]}))
+    model, draw = from_logs.amended(lab[1])
+    env = RigEnv("angle_steps", model=model, randomisation=draw, limits={"torque_command": [-1, 1]})
+    assert env.options.nominal.parameters["joint_spring"].stiffness == 0.0
+    seen = []
+    for seed in range(20):
+        env.reset(seed=seed)
+        drawn = env.plant.parameters
+        seen.append((drawn["joint_spring"].stiffness, drawn["joint_weight"].moment))
+    springs = [each for each in seen if each[0]]
+    assert 5 <= len(springs) <= 15
+    assert all(abs(s - 0.4) < 0.05 and w == 0.2 for s, w in springs)
+    assert all(abs(w - 0.3) < 0.05 for s, w in seen if not s)
 
 
 @pytest.mark.parametrize(

@@ -13,6 +13,7 @@ from pma_gym.data.trial_columns import BY_QUANTITY
 from pma_gym.discovery.answer.candidate_list import candidate_list
 from pma_gym.discovery.answer.estimates import (
     covariance_of,
+    rival_models,
     selected_effects,
     value_and_error,
 )
@@ -179,6 +180,7 @@ def diagnosis_from_findings(findings: Findings, tell: Progress, propose: bool = 
         given=findings.given,
         # Where nothing is amended, how sure the model's own parameters are.
         covariance=covariance_of(findings, fit if fit.paths else findings.refitted),
+        rivals=rival_models(findings, model) if verdict in ("effect", "undecidable") else (),
         not_identifiable={
             path: why
             for path, why in not_identifiable(findings, findings.selection.fit).items()

@@ -92,6 +92,28 @@ class Covariance:
 
 
 @dataclass(frozen=True)
+class RivalModel:
+    """A model that explains the data as well as the written one, by other effects.
+
+    Attributes:
+        name: its effects.
+        absent: values by effect and parameter, in file units, with which those of its effects that
+            the written model lacks do nothing there.
+        values: what differs from the written model with these, by path, in file units.
+        covariance: of its fitted parameters.
+    """
+
+    name: str
+    absent: Mapping[str, Mapping[str, Any]]
+    values: Mapping[str, Any]
+    covariance: Covariance
+
+    def document(self) -> dict[str, Any]:
+        """The model in `diagnosis.json`."""
+        return {**vars(self), "covariance": vars(self.covariance)}
+
+
+@dataclass(frozen=True)
 class Undetermined:
     """A parameter of an effect that the data do not determine: it has left the effect's law.
 
