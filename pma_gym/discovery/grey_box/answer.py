@@ -77,7 +77,7 @@ def rival_models(conclusions: Conclusions) -> tuple[RivalModel, ...]:
     models = []
     for each in last.alike:
         rival = each.moves[-1].candidate
-        if rival is not None and rival.name != move.name:
+        if rival is not None:
             fitted = with_numbers(each.box.model, each.fit.point.numbers)
             known = covariance_of(each.fit, fitted, conclusions.selection.model)
             models.append(rival_model([rival], [move], written, fitted, known))

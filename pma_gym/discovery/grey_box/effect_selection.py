@@ -857,9 +857,12 @@ class EffectSelection:
                 for other in tried[1:]
                 if other[:-1] == tried[0][:-1] and self._worth(other) > least
             ]
-            names = dict.fromkeys(each.moves[-1].name for each in near)
+            alike = {each.moves[-1].name: each for each in reversed(near)}
+            names = tuple(dict.fromkeys(each.moves[-1].name for each in near))
             rivals = tuple(name for name in names if name != last.moves[-1].name)
-            last = replace(last, rivals=(*now.rivals, rivals), alike=tuple(near))
+            last = replace(
+                last, rivals=(*now.rivals, rivals), alike=tuple(alike[name] for name in rivals)
+            )
             last = self._refined(self._other_hold(last) if free else last)
             best = [*chain[:-1], self._trend_instead(last)]
             beam = [best]
