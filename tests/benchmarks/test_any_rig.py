@@ -203,17 +203,16 @@ def test_an_episode_has_the_amended_model_or_a_rival(lab):
     }
     file.write_text(json.dumps(json.loads(file.read_text()) | {"rivals": [rival]}))
     model, draw = from_logs.amended(lab[1])
-    env = RigEnv("angle_steps", model=model, randomisation=draw, limits={"torque_command": [-1, 1]})
-    assert env.options.nominal.parameters["joint_spring"].stiffness == 0.0
-    seen = []
+    assert model.parameters["joint_spring"].stiffness == 0.0
+    limits = {"torque_command": [-1.0, 1.0]}
+    env, seen = RigEnv("angle_steps", model=model, randomisation=draw, limits=limits), []
     for seed in range(20):
         env.reset(seed=seed)
         drawn = env.plant.parameters
         seen.append((drawn["joint_spring"].stiffness, drawn["joint_weight"].moment))
-    springs = [each for each in seen if each[0]]
-    assert 5 <= len(springs) <= 15
-    assert all(abs(s - 0.4) < 0.05 and w == 0.2 for s, w in springs)
-    assert all(abs(w - 0.3) < 0.05 for s, w in seen if not s)
+    assert 5 <= sum(spring > 0.0 for spring, _ in seen) <= 15
+    for spring, weight in seen:
+        assert abs(spring - 0.4) < 0.05 and weight == 0.2 if spring else abs(weight - 0.3) < 0.05
 
 
 @pytest.mark.parametrize(
