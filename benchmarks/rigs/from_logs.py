@@ -3,7 +3,7 @@
 import hashlib
 import json
 from collections.abc import Mapping, Sequence
-from itertools import combinations
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -18,16 +18,15 @@ from controllers.rigs import RIG_CONTROLLERS, RigController
 from pma_gym.cli.terminal import print_table
 from pma_gym.data.datasets.dataset import Dataset, read_dataset
 from pma_gym.data.trial_columns import BY_QUANTITY
+from pma_gym.discovery.diagnosis import Covariance, RivalModel
+from pma_gym.document_shape import ListOf, check_shape, shape_of
 from pma_gym.pages.document import Block, Heading, Paragraph, to_html
 from pma_gym.plant.model import Model, dump_model, load_model
 from pma_gym.plant.sensors import direct_command
-from pma_gym.tasks import Uncertainty
+from pma_gym.tasks import OneOf, Uncertainty
 
 RATE_HZ = 50.0
 """Control rate."""
-
-QUANTILE = 1.96
-"""Standard deviations of half a 95 % interval."""
 
 BANDWIDTH_HZ = 1000.0
 """Of a sensor of which the logs tell the noise alone (assumption)."""
@@ -36,35 +35,43 @@ CONTROLLERS = ("feedforward", "pid", "feedforward_pid", "lqg")
 SEEDS = range(5)
 
 
-def amended(folder: Path) -> tuple[Model, Uncertainty]:
-    """The model of a diagnosis with the sensors' noise, and how uncertain its parameters are.
+def amended(folder: Path) -> tuple[Model, OneOf]:
+    """The model of a diagnosis with the sensors' noise, and what it may be in an episode.
+
+    Effects of rivals are in the model and do nothing; every episode draws it or one of them, with
+    parameters as uncertain as the fit has them.
 
     Args:
         folder: of the diagnosis.
+
+    Raises:
+        ValueError: `diagnosis.json` lacks covariance or rivals, or has them in another shape.
     """
-    model = load_model(folder / "model.toml")
-    document = json.loads((folder / "diagnosis.json").read_text(encoding="utf-8"))
-    ends = {
-        f"{effect['name']}.{name}": each
-        for effect in document["effects"]
-        for name, each in effect["parameters"].items()
-    }
-    ends |= {path: {**each, "value": each["to"]} for path, each in document["parameters"].items()}
-    known = {
-        path: each
-        for path, each in ends.items()
-        if path in set(model.paths()) and isinstance(each["low"], int | float)
-    }
-    paths = list(known)
-    errors = np.array([(e["high"] - e["low"]) / (2.0 * QUANTILE) for e in known.values()])
-    correlation = np.eye(len(paths))
-    for i, j in combinations(range(len(paths)), 2):
-        first, second = known[paths[i]], known[paths[j]]
-        # Two that were fitted as one number move as one.
-        if (first["value"], first["low"]) == (second["value"], second["low"]):
-            correlation[i, j] = correlation[j, i] = 1.0
-    covariance = (correlation * np.outer(errors, errors)).tolist()
-    return with_noise(model, document["floors"]), Uncertainty(tuple(paths), covariance)
+    file = folder / "diagnosis.json"
+    document = json.loads(file.read_text(encoding="utf-8"))
+    model = with_noise(load_model(folder / "model.toml"), document["floors"])
+    try:
+        check_shape(
+            document, {"covariance": shape_of(Covariance), "rivals": ListOf(shape_of(RivalModel))}
+        )
+        draws = [uncertainty_of(document["covariance"])]
+        for rival in document["rivals"]:
+            model = model.with_effects(rival["absent"])
+            draws.append(replace(uncertainty_of(rival["covariance"]), values=rival["values"]))
+    except ValueError as error:
+        raise ValueError(f"{file}: {error}; diagnose the logs again") from error
+    return model, OneOf(draws)
+
+
+def uncertainty_of(covariance: Mapping[str, Any]) -> Uncertainty:
+    """What draws parameters as a covariance of `diagnosis.json` has them."""
+    paths, errors, rows = (covariance[each.name] for each in fields(Covariance))
+    if {len(paths)} != {len(errors), len(rows), *map(len, rows)} and paths:
+        raise ValueError(
+            f"correlation must have {len(paths)} rows of {len(paths)} numbers and deviations as "
+            f"many, as there are parameters; got {[*map(len, rows)]} and {len(errors)}"
+        )
+    return Uncertainty(tuple(paths), (np.array(rows) * np.outer(errors, errors)).tolist())
 
 
 def with_noise(model: Model, floors: Mapping[str, Any]) -> Model:

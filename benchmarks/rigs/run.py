@@ -73,6 +73,9 @@ def chosen_controllers(
             known = ", ".join(RIG_CONTROLLERS)
             raise ValueError(f"a controller of any rig is {known} or a policy's .zip, got {name!r}")
         missing = RIG_CONTROLLERS[name].missing(info)
+        if missing and not names:
+            print(f"Without {name}: {missing}")
+            continue
         if missing:
             raise ValueError(f"{name} does not apply to model {info.model.name}: {missing}")
         settings = settings_of(out, f"{name}-{info.model.name}", name, options, tasks, progress)

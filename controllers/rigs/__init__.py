@@ -1,12 +1,13 @@
-"""Controllers of any rig, by its model: feed-forward, PID, LQG. `RIG_CONTROLLERS` lists them."""
+"""Controllers of any rig, by its model; `RIG_CONTROLLERS` lists them."""
 
 from controllers.rigs.feedforward import Feedforward
 from controllers.rigs.lqg import RigLQG
+from controllers.rigs.mpc import RigMPC
 from controllers.rigs.pid import FeedforwardPID, RigPID
 from controllers.rigs.rig_controller import RigController, RigMeasurement
 
 RIG_CONTROLLERS: dict[str, type[RigController]] = {
-    each.name: each for each in (Feedforward, RigPID, FeedforwardPID, RigLQG)
+    each.name: each for each in (Feedforward, RigPID, FeedforwardPID, RigLQG, RigMPC)
 }
 """Controllers by name: what makes a new one."""
 
@@ -17,5 +18,6 @@ __all__ = [
     "RigMeasurement",
     "RigController",
     "RigLQG",
+    "RigMPC",
     "RigPID",
 ]

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from controllers.rigs.nominal_rig import NominalRig
 from controllers.rigs.rig_controller import Lever, RigController, RigMeasurement
 from pma_gym.envs import RigInfo
+from pma_gym.plant.statics import Condition
 
 HORIZONS = (1, 2, 4, 8, 16)
 """Control periods ahead at which the nominal rig shall meet the reference; the best is taken."""
@@ -24,12 +25,14 @@ class NominalMotion(NamedTuple):
     Attributes:
         lever: what moves it.
         shares: lever in every control step, shape (steps,).
+        conditions: at the control steps, one more than them.
         signals: true signals (SI) at the control steps, by name.
         error: root mean square of what it misses (SI).
     """
 
     lever: Lever
     shares: NDArray[np.float64]
+    conditions: list[Condition]
     signals: dict[str, NDArray[np.float64]]
     error: float
 
@@ -51,7 +54,7 @@ def _planned(info: RigInfo, rig: NominalRig, lever: Lever, ahead: int) -> Nomina
     steps = info.task.steps(1.0 / period)
     references = schedule.reference(np.arange(steps + ahead + 1) * period)
     condition, share, shares = rig.start(), 0.0, np.zeros(steps)
-    seen = [rig.seen(condition)]
+    conditions = [condition]
     for k in range(steps):
         pair = (share, share + (NUDGE if share < 0.0 else -NUDGE))
         ends = [rig.held(condition, lever.commands(s), ahead * period)[0] for s in pair]
@@ -61,19 +64,17 @@ def _planned(info: RigInfo, rig: NominalRig, lever: Lever, ahead: int) -> Nomina
             share = float(np.clip(share + (references[k + ahead] - ends[0]) / slope, -1.0, 1.0))
         shares[k] = share
         _, condition = rig.held(condition, lever.commands(share), period)
-        seen.append(rig.seen(condition))
+        conditions.append(condition)
+    seen = [rig.seen(each) for each in conditions]
     signals = {name: np.array([each[name] for each in seen]) for name in seen[0]}
     missed = signals[rig.followed] - references[: steps + 1]
     error = float(np.sqrt(np.mean(missed**2)))
-    return NominalMotion(lever, shares, signals, error if np.isfinite(error) else np.inf)
+    return NominalMotion(
+        lever, shares, conditions, signals, error if np.isfinite(error) else np.inf
+    )
 
 
-@lru_cache(maxsize=64)
-def _kept(key: "_Key") -> NominalMotion:
-    return plan(key.info)
-
-
-class _Key(NamedTuple):
+class PlanKey(NamedTuple):
     """What a plan depends on; two episodes of one reference share theirs."""
 
     text: tuple[object, ...]
@@ -83,11 +84,11 @@ class _Key(NamedTuple):
         return hash(self.text)
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Key) and self.text == other.text
+        return isinstance(other, PlanKey) and self.text == other.text
 
 
-def plan_of(info: RigInfo) -> NominalMotion:
-    """The plan of a rig and a task, made once."""
+def key_of(info: RigInfo) -> PlanKey:
+    """What the plan of a rig and a task depends on."""
     times = np.arange(info.task.steps(1.0 / info.period)) * info.period
     text = (
         *(info.model.plant, tuple(info.model.parameters), info.model.vector().tobytes()),
@@ -99,7 +100,13 @@ def plan_of(info: RigInfo) -> NominalMotion:
             tuple(command.limits for command in info.commands),
         ),
     )
-    return _kept(_Key(text, info))
+    return PlanKey(text, info)
+
+
+@lru_cache(maxsize=64)
+def plan_of(key: PlanKey) -> NominalMotion:
+    """The plan of a rig and a task, made once."""
+    return plan(key.info)
 
 
 class Feedforward(RigController):
@@ -109,7 +116,7 @@ class Feedforward(RigController):
 
     def reset(self, info: RigInfo) -> None:
         """NominalMotion the trial."""
-        self.plan, self._period = plan_of(info), info.period
+        self.plan, self._period = plan_of(key_of(info)), info.period
         self._early = round(info.action_delay / info.period)
 
     def act(self, measurement: RigMeasurement) -> Sequence[float]:

@@ -63,6 +63,9 @@ PUSH_S = 0.2
 LEAST_SHARE = 0.3
 """Share of the strongest command's effect that another must have to move with it."""
 
+NO_EFFECT = 1e-6
+"""Share of the task's range below which what a command's whole range does is nothing."""
+
 
 class Lever:
     """One number, -1 to 1, that moves the commands which move the task's signal.
@@ -80,7 +83,7 @@ class Lever:
         self.low, self.high = limits.T
         self.rest = np.array(rig.rest)
         effects = np.array([self._effect(rig, at) for at in range(len(limits))])
-        share = effects / max(np.abs(effects).max(), 1e-300)
+        share = effects / max(np.abs(effects).max(), NO_EFFECT * info.task.schedule.span)
         moves = np.where(np.abs(share) >= LEAST_SHARE, np.sign(share), 0.0)
         reach = np.maximum(self.high - self.rest, self.rest - self.low)
         self.step = moves * reach
@@ -94,6 +97,6 @@ class Lever:
         moved = rig.held(start, pushed, PUSH_S)[0] - rig.held(start, self.rest, PUSH_S)[0]
         return moved / (pushed[at] - self.rest[at]) * (self.high[at] - self.low[at])
 
-    def commands(self, share: float) -> Array:
-        """Commands (SI) for a number from -1 to 1."""
+    def commands(self, share: float | Array) -> Array:
+        """Commands (SI) for a number from -1 to 1, or one for each command."""
         return np.clip(self.rest + share * self.step, self.low, self.high)

@@ -8,9 +8,11 @@ from typing import Any, Literal
 from pma_gym.discovery.result.candidate import UNFITTED, Candidate
 from pma_gym.discovery.result.estimates import (
     Approximate,
+    Covariance,
     Estimate,
     Moved,
     NamedEffect,
+    RivalModel,
     TrialState,
     Undetermined,
 )
@@ -21,9 +23,9 @@ from pma_gym.discovery.result.notebook_view import notebook_view
 from pma_gym.plant.model import Model
 
 __all__ = [
-    "Approximate", "Candidate", "Diagnosis", "Estimate", "Floor", "Gap", "Judgement", "Map",
-    "Moved", "NamedEffect", "NextExperiment", "Nuisance", "Place", "ResidualLaw", "TrialRecord",
-    "TrialState", "Undetermined", "Verdict",
+    "Approximate", "Candidate", "Covariance", "Diagnosis", "Estimate", "Floor", "Gap", "Judgement",
+    "Map", "Moved", "NamedEffect", "NextExperiment", "Nuisance", "Place", "ResidualLaw",
+    "RivalModel", "TrialRecord", "TrialState", "Undetermined", "Verdict",
 ]  # fmt: skip
 
 SCHEMA = 1
@@ -52,6 +54,8 @@ class Diagnosis:
         next_experiment: what to measure next, where that would tell more.
         model: the amended model.
         given: the model as it was given.
+        covariance: of the fitted parameters of the amended model.
+        rivals: models that explain the data as well, as far as they were fitted.
         not_identifiable: paths of parameters that these data do not determine, with the reason.
         not_detectable: effects that these data would not have shown at their usual size.
         approximate: effects whose law is only approximate, and what they leave; None where there
@@ -88,6 +92,8 @@ class Diagnosis:
     next_experiment: NextExperiment | None
     model: Model
     given: Model
+    covariance: Covariance = field(default_factory=Covariance)
+    rivals: tuple[RivalModel, ...] = ()
     not_identifiable: Mapping[str, str] = field(default_factory=dict)
     not_detectable: tuple[str, ...] = ()
     approximate: Approximate | None = None
@@ -122,6 +128,8 @@ class Diagnosis:
             "effects": [effect.document() for effect in self.effects],
             "approximate": self.approximate and self.approximate.document(),
             "parameters": {path: each.document() for path, each in self.parameters.items()},
+            "covariance": vars(self.covariance),
+            "rivals": [rival.document() for rival in self.rivals],
             "gap": {signal: gap.document() for signal, gap in self.gap.items()},
             "candidates": [vars(candidate) for candidate in self.candidates],
             "next_experiment": self.next_experiment and self.next_experiment.document(),

@@ -115,9 +115,14 @@ class Fit:
     scores: Array
 
     @cached_property
+    def curvature(self) -> Array:
+        """Covariance that the expected information alone gives, shape (p, p), in these units."""
+        return np.linalg.pinv(self.information)
+
+    @cached_property
     def deviations(self) -> dict[str, float]:
         """Standard errors (SI) by name, by the sandwich of information and scores."""
-        bread = np.linalg.pinv(self.information)
+        bread = self.curvature
         meat = self.scores.T @ self.scores
         wide = np.maximum(np.diag(bread @ meat @ bread), np.diag(bread))
         errors = np.sqrt(np.maximum(wide, 0.0))

@@ -85,15 +85,18 @@ class CompiledModel:
     def derivative(
         self,
         state: np.ndarray,
-        motor_voltage: float,
-        regulator_voltage: float,
+        motor_voltage: float | np.ndarray,
+        regulator_voltage: float | np.ndarray,
         zero_contraction: float,
     ) -> np.ndarray:
-        """Time derivative of the state vector (SI per s)."""
-        inputs = np.array([motor_voltage, regulator_voltage, zero_contraction], float)
-        state, out = np.ascontiguousarray(state, float), np.empty(len(self.states))
+        """Time derivative of the state vector (SI per s), or of many, shape (rows, states)."""
+        state = np.ascontiguousarray(state, float)
+        inputs, out = np.empty((*state.shape[:-1], 3)), np.empty_like(state)
+        columns = motor_voltage, regulator_voltage, zero_contraction
+        for i, values in enumerate(columns):
+            inputs[..., i] = values
         addresses = (a.ctypes.data for a in (state, inputs, self.vector))
-        self.program.derivative(1, *addresses, 0, out.ctypes.data)
+        self.program.derivative(out.size // len(self.states), *addresses, 0, out.ctypes.data)
         return out
 
     def observe(self, states: np.ndarray, zero_contraction: float) -> dict[str, np.ndarray]:

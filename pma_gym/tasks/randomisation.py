@@ -1,7 +1,7 @@
 """Randomisations of the station, drawn at every reset, by name."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -156,19 +156,40 @@ class Uncertainty:
     Attributes:
         paths: parameters, `effect.parameter_unit`.
         covariance: of them in file units, shape (paths, paths).
+        values: what the model has first, by path, in file units: those of a rival.
     """
 
     paths: Sequence[str]
     covariance: Sequence[Sequence[float]]
+    values: Mapping[str, Value] = field(default_factory=dict)
 
     def __call__(self, model: Model, generator: np.random.Generator) -> Model:
         """The model with drawn values."""
+        model = model.replace(self.values)
         known = {p: v for e in model.effects for k, v in model.values_in_files(e).items()
                  if (p := f"{e}.{k}") in self.paths}  # fmt: skip
         middle = [known[path] for path in self.paths]
+        if not middle:
+            return model
         drawn = generator.multivariate_normal(middle, self.covariance, method="eigh")
         pairs = zip(self.paths, drawn.tolist(), strict=True)
         return model.replace({path: _bounded(model, path, value) for path, value in pairs})
+
+
+@dataclass(frozen=True)
+class OneOf:
+    """Draws one of some randomisations, all as likely, and the model from it.
+
+    Attributes:
+        randomisations: one for each model that may be right.
+    """
+
+    randomisations: "Sequence[Randomisation]"
+
+    def __call__(self, model: Model, generator: np.random.Generator) -> Model:
+        """The model that one of them draws."""
+        draw = self.randomisations[int(generator.integers(len(self.randomisations)))]
+        return draw(model, generator)
 
 
 Randomisation = Callable[[Model, np.random.Generator], Model]

@@ -1,13 +1,15 @@
 """Controllers of any rig: by their model, tuned, trained, and from logs."""
 
 import json
+import sys
 
 import numpy as np
 import pytest
 
 from benchmarks.rigs import from_logs, run, tune
 from benchmarks.rigs.score import run_episode, scores
-from controllers.rigs import RIG_CONTROLLERS, Feedforward, RigLQG, RigPID
+from controllers.rigs import RIG_CONTROLLERS, Feedforward, RigLQG, RigMPC, RigPID
+from controllers.rigs.rig_controller import Lever
 from pma_gym import Plant, Trial
 from pma_gym.data.files.trial_files import write_trial
 from pma_gym.envs import RigEnv
@@ -60,10 +62,37 @@ def test_an_unknown_load_is_left_to_the_feedback(late):
         "contraction_steps", load=2.0, duration_s=6.0, control_rate_hz=50.0, **options, **late
     )
     errors = {}
-    for controller in (Feedforward({}), RigLQG(RigLQG.settings)):
+    for controller in (Feedforward({}), RigLQG(RigLQG.settings), RigMPC(RigMPC.settings)):
         info, *_ = run_episode(env, controller, 0)
         errors[controller.name] = info["percent_of_range"]
-    assert errors["lqg"] < 0.01 * errors["feedforward"]
+    assert max(errors["lqg"], errors["mpc"]) < 0.01 * errors["feedforward"]
+
+
+def weak(name, command, most):
+    """Options of a rig whose commands reach their limits."""
+    return RIGS[name][0] | {"limits": {command: [-most, most]}}
+
+
+@pytest.mark.parametrize(
+    ("options", "task", "most"),
+    [
+        (RIGS["joint"][0], "angle_multisine", 1.01),
+        (RIGS["slide"][0], "contraction_multisine", 1.01),
+        # Commands reach their limits from here on.
+        (weak("joint", "torque_command", 0.15), "angle_steps", 0.9),
+        (weak("slide", "load_command", 1.0), "contraction_steps", 0.95),
+        (RIGS["station"][0], "contraction_steps", 0.9),
+        ({"model": "muscle_joint"}, "angle_steps", 0.99),
+        ({"model": "muscle_pair"}, "angle_steps", 0.9),
+        ({"model": "valve_pair"}, "angle_steps", 0.9),
+    ],
+)
+def test_looking_ahead_pays_where_commands_reach_their_limits(options, task, most):
+    env = RigEnv(task, **options, duration_s=6.0, control_rate_hz=50.0)
+    errors = [
+        run_episode(env, kind(kind.settings), 0)[0]["percent_of_range"] for kind in (RigLQG, RigMPC)
+    ]
+    assert errors[1] < most * errors[0]
 
 
 def test_a_search_finds_better_settings_and_repeats_itself(monkeypatch):
@@ -104,10 +133,12 @@ def lab(tmp_path):
     (answer / "model.toml").write_text(dump_model(better), encoding="utf-8")
     document = {
         "sentence": "The weight is 0.3 N m.",
-        "effects": [],
-        "parameters": {
-            "joint_weight.moment_n_m": {"from": 0.2, "to": 0.3, "low": 0.28, "high": 0.32}
+        "covariance": {
+            "parameters": ["joint_weight.moment_n_m", "inertia.inertia_kg_m2"],
+            "deviations": [0.01, 1e-4],
+            "correlation": [[1.0, 0.9], [0.9, 1.0]],
         },
+        "rivals": [],
         "floors": {"angle_deg": {"value": 0.02, "step": None}},
     }
     (answer / "diagnosis.json").write_text(json.dumps(document), encoding="utf-8")
@@ -148,10 +179,57 @@ def test_logs_become_controllers_and_scores_and_a_second_run_goes_on(lab, monkey
     assert {path: path.stat().st_mtime_ns for path in out.glob("p*")} == kept
 
 
-def test_uncertainty_is_as_wide_as_the_intervals(lab):
-    _, uncertainty = from_logs.amended(lab[1])
-    assert uncertainty.paths == ("joint_weight.moment_n_m",)
-    assert uncertainty.covariance[0][0] ** 0.5 == pytest.approx(0.04 / (2 * 1.96))
+def test_rigs_are_drawn_as_the_fit_correlates_their_parameters(lab):
+    model, uncertainty = from_logs.amended(lab[1])
+    generator = np.random.default_rng(0)
+    drawn = [uncertainty(model, generator).parameters for _ in range(500)]
+    rows = np.array([(each["joint_weight"].moment, each["inertia"].inertia) for each in drawn])
+    assert rows.std(axis=0) == pytest.approx([0.01, 1e-4], rel=0.1)
+    assert np.corrcoef(rows.T)[0, 1] == pytest.approx(0.9, abs=0.03)
+
+
+def test_an_episode_has_the_amended_model_or_a_rival(lab):
+    """The rival has a spring in the place of the weight, and a damping of its own."""
+    file = lab[1] / "diagnosis.json"
+    rival = {
+        "name": "joint_spring",
+        "absent": {"joint_spring": {"stiffness_n_m_per_rad": 0.0, "rest_deg": 0.0}},
+        "values": {"joint_spring.stiffness_n_m_per_rad": 0.4, "joint_weight.moment_n_m": 0.2},
+        "covariance": {
+            "parameters": ["joint_spring.stiffness_n_m_per_rad"],
+            "deviations": [0.01],
+            "correlation": [[1.0]],
+        },
+    }
+    file.write_text(json.dumps(json.loads(file.read_text()) | {"rivals": [rival]}))
+    model, draw = from_logs.amended(lab[1])
+    assert model.parameters["joint_spring"].stiffness == 0.0
+    limits = {"torque_command": [-1.0, 1.0]}
+    env, seen = RigEnv("angle_steps", model=model, randomisation=draw, limits=limits), []
+    for seed in range(20):
+        env.reset(seed=seed)
+        drawn = env.plant.parameters
+        seen.append((drawn["joint_spring"].stiffness, drawn["joint_weight"].moment))
+    assert 5 <= sum(spring > 0.0 for spring, _ in seen) <= 15
+    for spring, weight in seen:
+        assert abs(spring - 0.4) < 0.05 and weight == 0.2 if spring else abs(weight - 0.3) < 0.05
+
+
+@pytest.mark.parametrize(
+    ("change", "fault"),
+    [
+        (None, "covariance is missing"),
+        ({"correlation": [[1.0]]}, "correlation must have 2 rows of 2"),
+    ],
+)
+def test_a_diagnosis_without_its_covariance_is_refused(lab, change, fault):
+    file = lab[1] / "diagnosis.json"
+    document = json.loads(file.read_text())
+    kept = document.pop("covariance")
+    document |= {"covariance": kept | change} if change else {}
+    file.write_text(json.dumps(document))
+    with pytest.raises(ValueError, match=f"diagnosis.json: {fault}.*diagnose the logs again"):
+        from_logs.amended(lab[1])
 
 
 def test_a_controller_says_which_rigs_it_is_for(monkeypatch, tmp_path):
@@ -159,8 +237,20 @@ def test_a_controller_says_which_rigs_it_is_for(monkeypatch, tmp_path):
     options = RIGS["joint"][0]
     with pytest.raises(ValueError, match="pid does not apply to model arm: no brake"):
         run.chosen_controllers(["pid"], options, ["angle_steps"], tmp_path, Silent())
+    monkeypatch.setattr(Lever, "_effect", lambda self, rig, at: 1e-7)
+    with pytest.raises(ValueError, match="mpc does not apply.*no command moves angle from rest"):
+        run.chosen_controllers(["mpc"], options, ["angle_steps"], tmp_path, Silent())
     with pytest.raises(ValueError, match="a controller of any rig is feedforward, pid"):
         run.chosen_controllers(["pda"], options, ["angle_steps"], tmp_path, Silent())
+
+
+def test_what_does_not_apply_is_left_out_unless_asked_for(monkeypatch, tmp_path, capsys):
+    monkeypatch.setattr(tune, "EVALUATIONS", 4)
+    monkeypatch.setitem(sys.modules, "osqp", None)
+    options = RIGS["joint"][0] | {"duration_s": 0.5, "control_rate_hz": 50.0}
+    made = run.chosen_controllers([], options, ["angle_steps"], tmp_path, Silent())
+    assert set(RIG_CONTROLLERS) - set(made) == {"mpc"}
+    assert "Without mpc: " in (said := capsys.readouterr().out) and "pip install" in said
 
 
 def test_settings_are_kept_for_the_environment_that_they_were_found_on(monkeypatch, tmp_path):

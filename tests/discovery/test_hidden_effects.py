@@ -51,6 +51,15 @@ def test_a_hidden_effect_is_named(name):
     assert len(diagnosis.effects) == 1, diagnosis.sentence
 
 
+@pytest.mark.campaign
+def test_a_lag_of_the_drive_is_written_with_the_delay_that_explains_as_much():
+    diagnosis = diagnosed("drive_lag")
+    (rival,) = diagnosis.rivals
+    assert (rival.name,) == diagnosis.effects[0].confused_with == ("drive_delay",)
+    assert rival.absent["drive_delay"]["share"] == 0.0 and rival.values["drive_lag.share"] == 0.0
+    assert rival.values["drive_delay.delay_ms"] == pytest.approx(4.5, rel=0.05)
+
+
 @marked(QUIET)
 def test_where_nothing_is_hidden_nothing_is_claimed(name):
     diagnosis = diagnosed(name)

@@ -108,6 +108,12 @@ def test_hysteresis_is_named_with_its_size():
         assert 0.0 <= estimate.low < estimate.value < estimate.high
         assert abs(estimate.value - truth) < 3.0 * (estimate.high - estimate.low) / 3.92
         assert (note.low, note.high) == pytest.approx((estimate.low, estimate.high))
+        at = diagnosis.covariance.parameters.index(f"hysteresis.{name}")
+        width = 3.92 * diagnosis.covariance.deviations[at]
+        assert width == pytest.approx(estimate.high - estimate.low)
+    correlation = np.array(diagnosis.covariance.correlation)
+    assert np.linalg.eigvalsh(correlation).min() > 0.0 and np.allclose(np.diag(correlation), 1.0)
+    assert set(diagnosis.parameters) < set(diagnosis.covariance.parameters)
     first, *_ = diagnosis.candidates
     assert (first.name, first.why) == ("hysteresis", "added to the model")
     assert first.held_out_gain > 0.0

@@ -296,6 +296,7 @@ def test_parameters_are_drawn_from_ranges_or_a_covariance():
     assert low <= values.min() < low + 0.001 and high - 0.001 < values.max() <= high
     paths = (path, "joint_weight.moment_n_m")
     covariance = np.array([[4e-8, 3e-6], [3e-6, 1e-3]])
+    assert Uncertainty((), [])(JOINT, generator) is JOINT
     models = [Uncertainty(paths, covariance.tolist())(JOINT, generator) for _ in range(2000)]
     pairs = np.array([[m.parameters["inertia"].inertia, m.parameters["joint_weight"].moment]
                       for m in models])  # fmt: skip

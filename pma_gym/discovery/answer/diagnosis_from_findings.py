@@ -11,7 +11,12 @@ import numpy as np
 
 from pma_gym.data.trial_columns import BY_QUANTITY
 from pma_gym.discovery.answer.candidate_list import candidate_list
-from pma_gym.discovery.answer.estimates import selected_effects, value_and_error
+from pma_gym.discovery.answer.estimates import (
+    covariance_of,
+    rival_models,
+    selected_effects,
+    value_and_error,
+)
 from pma_gym.discovery.answer.own_parameters import (
     moved_parameters,
     not_identifiable,
@@ -158,7 +163,8 @@ def diagnosis_from_findings(findings: Findings, tell: Progress, propose: bool = 
         np.array([floor.level for floor in findings.floors]),
         findings.seed,
     )
-    states = trial_states(*proposal(findings, verdict), [each.name for each in findings.named])
+    problem, fit, chosen = proposal(findings, verdict)
+    states = trial_states(problem, fit, chosen, [each.name for each in findings.named])
     tell("putting the answer together", 2, 3)
     hidden = decision.not_detectable
     diagnosis = Diagnosis(
@@ -172,6 +178,9 @@ def diagnosis_from_findings(findings: Findings, tell: Progress, propose: bool = 
         next_experiment=proposed_experiment(findings, verdict, hidden) if propose else None,
         model=model,
         given=findings.given,
+        # Where nothing is amended, how sure the model's own parameters are.
+        covariance=covariance_of(findings, fit if fit.paths else findings.refitted),
+        rivals=rival_models(findings, model) if verdict in ("effect", "undecidable") else (),
         not_identifiable={
             path: why
             for path, why in not_identifiable(findings, findings.selection.fit).items()

@@ -1,16 +1,18 @@
 """Estimates and their intervals, from the fits of a diagnosis."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
 from pma_gym.discovery.fitting.fit_problem import SURE, Fitted
 from pma_gym.discovery.fitting.free_parameters import at_limit, unit
-from pma_gym.discovery.result.estimates import Estimate, NamedEffect
+from pma_gym.discovery.result.estimates import Covariance, Estimate, NamedEffect, RivalModel
 from pma_gym.discovery.screening.score_test import ScreeningScore
 from pma_gym.discovery.selection.candidate_fits import LEAST_GAIN
 from pma_gym.discovery.selection.stages import Stage
 from pma_gym.discovery.verdict.findings import Findings
+from pma_gym.plant.model import Model, ModelError
 
 
 def selected_effects(findings: Findings) -> tuple[NamedEffect, ...]:
@@ -106,3 +108,68 @@ def value_and_error(findings: Findings, fit: Fitted, path: str) -> tuple[float, 
     if findings.elimination is not None:
         error = float(np.maximum(error, findings.selection.fit.estimate(path)[1]))
     return value, error
+
+
+def covariance_of(findings: Findings, fit: Fitted) -> Covariance:
+    """Of a fit's parameters, with the standard errors of `value_and_error`."""
+    errors = [value_and_error(findings, fit, path)[1] for path in fit.paths]
+    return Covariance.of(fit.paths, errors, fit.covariance)
+
+
+def rival_models(findings: Findings, written: Model) -> tuple[RivalModel, ...]:
+    """Models that explain the data as well as the written one.
+
+    With rivals of its effects; with the selected effects, where they are not written.
+    """
+    chosen, fit = findings.selection.chosen, findings.selection.fit
+    fits = [(fit, chosen)] if not {c.effect for c in chosen} <= {*written.parameters} else []
+    for place, rivals in enumerate(findings.rivals):
+        fits += [
+            (rival.fit, (*chosen[:place], rival.candidate, *chosen[place + 1 :]))
+            for rival in rivals
+            if rival.equal
+        ]
+    models = (
+        rival_model(
+            *(effects, chosen, written, each.model),
+            Covariance.of(each.paths, np.sqrt(np.diag(each.covariance)).tolist(), each.covariance),
+        )
+        for each, effects in fits
+    )
+    return tuple(model for model in models if model is not None)
+
+
+def rival_model(
+    effects: Sequence[CandidateEffect],
+    replaced: Sequence[CandidateEffect],
+    written: Model,
+    fitted: Model,
+    covariance: Covariance,
+) -> RivalModel | None:
+    """A rival as it stands beside the written model; None where no rig takes the effects of both.
+
+    Args:
+        effects: of the rival.
+        replaced: of the written model, which do nothing in the rival unless it has them too.
+        written: the written model.
+        fitted: the rival's.
+        covariance: of its parameters.
+    """
+    both, alone = written, fitted
+    try:
+        for each in effects:
+            both = each.beside(both)
+        for each in replaced:
+            alone = each.beside(alone)
+    except ModelError:
+        return None
+    values = {
+        f"{effect}.{key}": value
+        for effect in both.parameters
+        if effect in alone.parameters
+        for key, value in alone.values_in_files(effect).items()
+        if value != both.values_in_files(effect)[key]
+    }
+    added = [each for each in both.parameters if each not in written.parameters]
+    absent = {each: both.values_in_files(each) for each in added}
+    return RivalModel(" and ".join(each.name for each in effects), absent, values, covariance)

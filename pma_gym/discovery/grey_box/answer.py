@@ -2,12 +2,15 @@
 
 from collections.abc import Callable, Mapping, Sequence
 
+import numpy as np
+
 from pma_gym.data.datasets.dataset import NamedTrial
 from pma_gym.data.trial_columns import BY_QUANTITY
+from pma_gym.discovery.answer.estimates import rival_model
 from pma_gym.discovery.diagnosis import Diagnosis
 from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
 from pma_gym.discovery.fitting.journal import Journal
-from pma_gym.discovery.grey_box.conclusions import Conclusions, path_of
+from pma_gym.discovery.grey_box.conclusions import Conclusions, path_of, quantity_of, with_numbers
 from pma_gym.discovery.grey_box.effect_selection import EffectSelection
 from pma_gym.discovery.grey_box.kept_fits import kept_in
 from pma_gym.discovery.grey_box.latent_law import drafted_effect
@@ -18,9 +21,10 @@ from pma_gym.discovery.grey_box.thresholds import (
 )
 from pma_gym.discovery.report.effect_text import effect_name
 from pma_gym.discovery.report.figure_text import figure, listed
-from pma_gym.discovery.result.estimates import Approximate
+from pma_gym.discovery.result.estimates import Approximate, Covariance, RivalModel
 from pma_gym.discovery.result.noise import Floor
 from pma_gym.estimation.innovations import TREND, TRIAL
+from pma_gym.estimation.likelihood_fit import Fit, value_of
 from pma_gym.estimation.logged import Logged
 from pma_gym.plant.model import Model
 from pma_gym.units import SI_FACTORS
@@ -51,6 +55,12 @@ def diagnosis(conclusions: Conclusions, propose: bool) -> Diagnosis:
         next_experiment=following,
         model=conclusions.model,
         given=conclusions.selection.model,
+        covariance=covariance_of(
+            (base if conclusions.verdict == "unknown" else last).fit,
+            conclusions.model,
+            conclusions.selection.model,
+        ),
+        rivals=rival_models(conclusions),
         approximate=Approximate(conclusions.effects, conclusions.left, conclusions.holds_out(last))
         if approximate
         else None,
@@ -67,6 +77,48 @@ def diagnosis(conclusions: Conclusions, propose: bool) -> Diagnosis:
         steps=_steps(conclusions),
         warnings=(*([WORSE] if conclusions.is_worse else []), *filter(None, [none_helps])),
     )
+
+
+def rival_models(conclusions: Conclusions) -> tuple[RivalModel, ...]:
+    """Models with another effect in the place of the last one, which were worth as much."""
+    last, written = conclusions.last, conclusions.model
+    move = last.moves[-1].candidate if last.moves else None
+    if conclusions.verdict != "effect" or move is None or move.effect not in written.parameters:
+        return ()
+    models = []
+    for each in last.alike:
+        rival = each.moves[-1].candidate
+        if rival is not None:
+            fitted = with_numbers(each.box.model, each.fit.point.numbers)
+            known = covariance_of(each.fit, fitted, conclusions.selection.model)
+            models.append(rival_model([rival], [move], written, fitted, known))
+    return tuple(model for model in models if model is not None)
+
+
+def covariance_of(made: Fit, written: Model, given: Model) -> Covariance:
+    """Of the fitted parameters that a written model has, tied ones as those that they follow."""
+    names = [coordinate.name for coordinate in made.coordinates]
+    slots = {**{name: name for name in names}, **made.tied, "drive_delay.delay": "delay"}
+    rows: dict[str, int] = {}
+    errors = []
+    for slot, of in slots.items():
+        effect, _, stem = slot.partition(".")
+        many = any(mark in slot for mark in (TRIAL, TREND, "["))
+        # How far a contact gives before it slides is no parameter that is said.
+        if (
+            not stem
+            or many
+            or of not in names
+            or (stem == "presliding" and effect in given.parameters)
+        ):
+            continue
+        if (path := path_of(slot)) in set(written.paths()):
+            quantity, value = quantity_of(slot), value_of(made.point, of)
+            rows[path] = names.index(of)
+            low, high = (quantity.from_si(v) for v in (value, value + made.deviations[of]))
+            errors.append(high - low)
+    at = list(rows.values())
+    return Covariance.of(list(rows), errors, made.curvature[np.ix_(at, at)])
 
 
 WORSE = (

@@ -374,18 +374,7 @@ class Conclusions:
                 CATALOGUE["drive_delay"].quantities["delay"].from_si(last.fit.point.delay)
             )
             model = model.replace({"drive_delay.share": 1.0, "drive_delay.delay_ms": milliseconds})
-        changes = {}
-        for name, value in last.fit.point.numbers.items():
-            effect, _, stem = name.partition(".")
-            if stem in model.effects[effect].rows or TREND in stem or TRIAL in stem or "[" in stem:
-                continue
-            if value != getattr(model.parameters[effect], stem):
-                quantity = CATALOGUE[effect].quantities[stem]
-                # A bound in SI and back may be a bit beyond itself.
-                changes[path_of(name)] = float(
-                    np.clip(quantity.from_si(value), quantity.lower, quantity.upper)
-                )
-        return model.replace(changes)
+        return with_numbers(model, last.fit.point.numbers)
 
     def estimate(self, name: str) -> Estimate:
         """A fitted number with its interval, in its file unit."""
@@ -522,6 +511,22 @@ class Conclusions:
     @cached_property
     def _ended(self) -> list[Smoothed]:
         return [smoothed(self.last.box, self.last.fit.point, i) for i in range(len(self.named))]
+
+
+def with_numbers(model: Model, numbers: Mapping[str, float]) -> Model:
+    """A model with fitted numbers (SI) by slot; those of one trial alone are none of it."""
+    changes = {}
+    for name, value in numbers.items():
+        effect, _, stem = name.partition(".")
+        if stem in model.effects[effect].rows or TREND in stem or TRIAL in stem or "[" in stem:
+            continue
+        if value != getattr(model.parameters[effect], stem):
+            quantity = CATALOGUE[effect].quantities[stem]
+            # A bound in SI and back may be a bit beyond itself.
+            changes[path_of(name)] = float(
+                np.clip(quantity.from_si(value), quantity.lower, quantity.upper)
+            )
+    return model.replace(changes)
 
 
 def path_of(name: str) -> str:

@@ -171,12 +171,14 @@ class Hypothesis:
         fit: its fit.
         moves: what was added.
         rivals: names of moves that would have done as well as the last one.
+        alike: hypotheses with these in the place of the last move.
     """
 
     box: GreyBox
     fit: Fit
     moves: tuple[Move, ...] = ()
     rivals: tuple[tuple[str, ...], ...] = ()
+    alike: tuple["Hypothesis", ...] = ()
 
 
 class EffectSelection:
@@ -881,12 +883,16 @@ class EffectSelection:
                 break
             least = self._worth(chain) - LIKE
             near = [
-                other[-1].moves[-1].name
+                other[-1]
                 for other in tried[1:]
                 if other[:-1] == tried[0][:-1] and self._worth(other) > least
             ]
-            rivals = tuple(dict.fromkeys(name for name in near if name != last.moves[-1].name))
-            last = replace(last, rivals=(*now.rivals, rivals))
+            alike = {each.moves[-1].name: each for each in reversed(near)}
+            names = tuple(dict.fromkeys(each.moves[-1].name for each in near))
+            rivals = tuple(name for name in names if name != last.moves[-1].name)
+            last = replace(
+                last, rivals=(*now.rivals, rivals), alike=tuple(alike[name] for name in rivals)
+            )
             last = self._refined(self._other_hold(last) if free else last)
             best = [*chain[:-1], self._trend_instead(last)]
             beam = [best]

@@ -1,8 +1,11 @@
 """Values with their intervals, and the effects and parameters that a diagnosis gives them for."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 
 @dataclass(frozen=True)
@@ -50,6 +53,64 @@ class Moved:
             "unit": self.now.unit,
             "significant": self.significant,
         }
+
+
+@dataclass(frozen=True)
+class Covariance:
+    """How uncertain fitted parameters are together.
+
+    Attributes:
+        parameters: their paths, `effect.parameter_unit`.
+        deviations: standard errors in file units.
+        correlation: of them, shape (parameters, parameters).
+    """
+
+    parameters: tuple[str, ...] = ()
+    deviations: tuple[float, ...] = ()
+    correlation: tuple[tuple[float, ...], ...] = ()
+
+    @classmethod
+    def of(
+        cls, paths: Sequence[str], deviations: Sequence[float], matrix: NDArray[np.float64]
+    ) -> "Covariance":
+        """Of parameters whose standard errors are finite, correlated as in a matrix.
+
+        Args:
+            paths: of the parameters.
+            deviations: standard errors in file units.
+            matrix: correlation, or covariance in any units, shape (paths, paths).
+        """
+        kept = np.flatnonzero(np.isfinite(deviations) & (np.diag(matrix) > 0.0)).tolist()
+        inside = matrix[np.ix_(kept, kept)]
+        spread = np.sqrt(np.diag(inside))
+        correlation = np.clip(inside / np.outer(spread, spread), -1.0, 1.0)
+        return cls(
+            tuple(paths[i] for i in kept),
+            tuple(float(deviations[i]) for i in kept),
+            tuple(map(tuple, correlation.tolist())),
+        )
+
+
+@dataclass(frozen=True)
+class RivalModel:
+    """A model that explains the data as well as the written one, by other effects.
+
+    Attributes:
+        name: its effects.
+        absent: values by effect and parameter, in file units, with which those of its effects that
+            the written model lacks do nothing there.
+        values: what differs from the written model with these, by path, in file units.
+        covariance: of its fitted parameters.
+    """
+
+    name: str
+    absent: Mapping[str, Mapping[str, Any]]
+    values: Mapping[str, Any]
+    covariance: Covariance
+
+    def document(self) -> dict[str, Any]:
+        """The model in `diagnosis.json`."""
+        return {**vars(self), "covariance": vars(self.covariance)}
 
 
 @dataclass(frozen=True)

@@ -180,6 +180,38 @@ def test_dry_friction_that_the_model_lacks_is_named_with_its_size(plant):
     assert diagnosis.verdict == "effect" and set(sizes) == {DRY[plant]}, diagnosis.sentence
 
 
+def test_a_rival_of_an_effect_is_written_with_its_fit():
+    """A small swing does not tell a spring from a weight, both as strong."""
+    tables = {
+        "torque_drive": {"gain": 1.0},
+        "joint_damping": {"coefficient_n_m_s": 0.02},
+        "inertia": {"inertia_kg_m2": 0.005},
+        "joint_start": {"angle_deg": 0.0, "spin_deg_per_s": 0.0},
+        "encoder": {"bandwidth_hz": 500.0, "noise_deg": 0.02},
+    }
+    free = Model("arm", "arm", "joint", {n: CATALOGUE[n].parse(t) for n, t in tables.items()})
+    hidden = Plant(free.with_effects({"joint_weight": {"moment_n_m": 0.2, "offset_deg": 0.0}}))
+    trials, time, generator = [], np.arange(150) / 50.0, np.random.default_rng(0)
+    for torque, rate in ((0.006, 5.0), (0.008, 3.0), (0.005, 8.0)):
+        asked = torque * np.sin(rate * time) + 0.5 * torque * np.sin(2.3 * rate * time)
+        swing = hidden.simulate(Trial(time, {"torque_command": asked}))
+        read = swing.measurements["angle"] + 4e-3 * generator.standard_normal(time.size)
+        trials.append(Trial(time, swing.commands, {"angle": read}))
+    diagnosis = diagnose(trials, free, propose=False)
+    sizes = {"joint_weight": "moment_n_m", "joint_spring": "stiffness_n_m_per_rad"}
+    ((effect,), (rival,)) = diagnosis.effects, diagnosis.rivals
+    assert {effect.name, rival.name} == set(sizes) and effect.confused_with == (rival.name,)
+    size = f"{rival.name}.{sizes[rival.name]}"
+    assert rival.values[size] == pytest.approx(0.2, rel=0.1)
+    assert rival.values[f"{effect.name}.{sizes[effect.name]}"] == 0.0
+    either = diagnosis.model.with_effects(rival.absent)
+    assert either.replace(rival.values).parameters[rival.name] != either.parameters[rival.name]
+    assert {size, "inertia.inertia_kg_m2"} < set(rival.covariance.parameters)
+    known, own = diagnosis.covariance, diagnosis.parameters["inertia.inertia_kg_m2"].now
+    error = known.deviations[known.parameters.index("inertia.inertia_kg_m2")]
+    assert 3.92 * error == pytest.approx(own.high - own.low)
+
+
 @pytest.mark.parametrize("presliding_deg", [1.6e-4, 2e-3])
 def test_the_latent_force_beside_a_friction_that_hardly_gives_is_small(presliding_deg):
     *_, noise, _, reading = RIGS["joint"]
