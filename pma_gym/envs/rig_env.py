@@ -260,6 +260,11 @@ class RigVectorEnv(PMAVectorEnv):
         **options: Any,
     ) -> None:
         """Check the options and compile."""
+        if "goal" in options:
+            raise ValueError(
+                "a batch has no goal observations: make single environments, as with "
+                'vectorization_mode="sync", and leave goal out here'
+            )
         check_keywords("RigVectorEnv.__init__()", options, RigOptions.names(), OWN)
         given: Any = (num_envs, task, autoreset_mode, threads, precision, None, render_mode)
         super().__init__(*given, **options)

@@ -4,7 +4,7 @@ import copy
 import json
 import pickle
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import gymnasium as gym
 import numpy as np
@@ -51,6 +51,7 @@ OPTIONS = {
     "slide": {"model": SLIDE, "span": 0.05},
 } | {model.plant: {"model": name} for name in shipped_models() for model in [load_model(name)]}
 """Options of an environment of every rig, by its name."""
+VALVES = load_model("valve_pair")
 MOVED = ("inertia.inertia_kg_m2", "slide.mass_kg", "lvdt.noise_mm")
 """Parameters that are drawn, the first that a model has."""
 
@@ -276,11 +277,31 @@ def test_an_episode_ends_beyond_a_bound():
         ({"load": [1.0]}, "load must be a number or two"),
         ({"compiled": False}, "unexpected keyword argument 'compiled'"),
         ({"reference": ["speed_steps"]}, "speed_steps differs"),
+        ({"reference": "rand"}, "'rand' is no task of this rig, such as angle_steps_3"),
+        ({"model": replace(JOINT, parameters={k: v for k, v in VALVES.parameters.items()
+                                              if "valve" not in k}, plant="muscle_pair")},
+         "takes no command: give it one of [regulator_line], [valve_spool]"),
     ],
 )  # fmt: skip
 def test_what_cannot_be_is_refused_with_the_fix(given, words):
     with pytest.raises((ValueError, TypeError), match=re.escape(words)):
         RigEnv(**OPTIONS["joint"] | given)
+
+
+def test_a_batch_says_that_it_has_no_goals():
+    with pytest.raises(ValueError, match='vectorization_mode="sync"'):
+        RigVectorEnv(2, goal=True, **OPTIONS["joint"])
+
+
+@pytest.mark.parametrize("kind", ["steps", "ramps", "sine", "multisine"])
+@pytest.mark.parametrize("rig", ["muscle_joint", "muscle_pair"])
+def test_pressures_within_their_limits_hold_every_reference_of_an_arm(rig, kind):
+    env = RigEnv(f"angle_{kind}", model=rig)
+    first, *second = env.options.commands
+    rest = Plant(rig).settle(*(each.low for each in second), regulator_voltage=first.high)
+    highest = Plant(rig).observe(rest.state[None, :], rest.zero_contraction)["angle"][0]
+    phase = env.task.schedule.phases[0]
+    assert 0.6 * highest < phase.reference(phase.times).max() < highest
 
 
 def test_a_station_refuses_the_task_of_a_rig():
