@@ -99,6 +99,29 @@ def test_checkers_find_nothing(options, recwarn):
     assert [str(w.message) for w in recwarn if "not within" in str(w.message)] == []
 
 
+def test_its_picture_shows_rig_and_course_and_comes_back(options):
+    env = RigEnv(render_mode="rgb_array", render_width=400, **options)
+    env.reset(seed=0)
+    start = env.render()
+    acted(env, 30)
+    later = env.render()
+    assert start.shape == (200, 400, 3) and start.dtype == np.uint8
+    for part in (np.s_[:, :185], np.s_[:100, 215:], np.s_[100:, 215:]):
+        assert np.any(start[part] != later[part])
+    env.reset(seed=0)
+    np.testing.assert_array_equal(env.render(), start)
+
+
+@pytest.mark.parametrize("rig", ["joint", "muscle_joint", "muscle_pair"])
+def test_a_drawn_arm_hangs_at_zero_and_its_reference_is_across_at_a_right_angle(rig):
+    env = RigEnv(tracking("angle", Across()), render_mode="rgb_array", **OPTIONS[rig])
+    env.reset(seed=0)
+    drawn = env.render()[:, :376].astype(int)
+    mark = np.argwhere(np.all(np.abs(drawn - [0xE0, 0x7B, 0x00]) < 8, axis=2)).mean(axis=0)
+    # The axis is at row 175, column 188; the mark beyond the arm's end, on the right.
+    np.testing.assert_allclose(mark, [175.0, 327.0], atol=4.0)
+
+
 def test_it_moves_as_the_plant_does(options):
     env = RigEnv(**options, noise=False)
     _, info = env.reset(seed=0)
@@ -325,6 +348,14 @@ def test_parameters_are_drawn_from_ranges_or_a_covariance():
     env = RigVectorEnv(9, randomisation=Uncertainty(paths, covariance), **OPTIONS["joint"])
     env.reset(seed=1)
     assert len({env.member(i).plant.model.parameters["inertia"].inertia for i in range(9)}) == 9
+
+
+@dataclass(frozen=True)
+class Across:
+    """A quarter of a turn, all the time."""
+
+    def __call__(self, time):
+        return 0.5 * np.pi + 0.0 * np.asarray(time)
 
 
 @dataclass(frozen=True)
