@@ -106,9 +106,7 @@ class RigLQG(Feedforward):
         shaken[n, n] = disturbance**2 * info.period
         noise = np.diag(self._noise(info) ** 2)
         seen = np.hstack([c, np.zeros((len(c), 1 + delay))])
-        # SciPy's balancing converts scale factors beyond integers, which it then leaves alone.
-        with np.errstate(invalid="ignore"):
-            spread = solve_discrete_are(whole.T, seen.T, shaken, noise)
+        spread = solve_discrete_are(whole.T, seen.T, shaken, noise)
         self._filter = spread @ seen.T @ np.linalg.inv(seen @ spread @ seen.T + noise)
         self._whole, self._enters, self._seen = whole, enters, seen
         self._estimate, self._ahead = np.zeros(len(whole)), np.linalg.matrix_power(whole, delay)
