@@ -131,7 +131,10 @@ class Quantity:
     def __post_init__(self) -> None:
         """Refuse a unit without a factor, reversed bounds, and a usual value beyond them."""
         if self.unit not in SI_FACTORS:
-            raise ValueError(f"unknown unit {self.unit!r}; add it to pma_gym.units.SI_FACTORS")
+            raise ValueError(
+                f"unknown unit {self.unit!r}; write one of {', '.join(SI_FACTORS)}, or say before "
+                f"it what one is in SI: pma_gym.units.SI_FACTORS[{self.unit!r}] = ..."
+            )
         if not self.lower <= self.upper:
             bounds = with_unit(f"{self.lower} to {self.upper}", self.unit)
             raise ValueError(f"bounds {bounds} are reversed")

@@ -209,7 +209,7 @@ def test_what_cannot_be_evaluated_ends_in_one_message(run, tmp_path, task, messa
 def test_info_names_models_and_environments(run):
     code, out, _ = run("info")
     assert code == 0
-    for name in ("llvmlite", "serres2008", "cascade", "pma_gym/IsokineticRotation-v0"):
+    for name in ("llvmlite", "serres2008", "cascade", "pma_gym/IsokineticRotation-v0", "Rig-v0"):
         assert name in out
 
 

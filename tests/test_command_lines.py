@@ -18,6 +18,7 @@ from pma_gym.cli.terminal import print_json
 from pma_gym.data.datasets.dataset import read_dataset
 from pma_gym.data.files.trial_files import read_trial, write_trial
 from pma_gym.effects.user_effects import load_effects
+from pma_gym.envs import RIG_ID
 from pma_gym.plant.model import dump_model
 from pma_gym.tasks import EVERY_TASK
 
@@ -199,7 +200,7 @@ def test_a_shell_completes_commands_options_models_and_tasks(run, monkeypatch, w
 def test_info_is_json_for_programs(run):
     document = json.loads(run("info", "--json")[1])
     assert document["versions"]["pma-gym"] == pma_gym.__version__
-    assert {each["id"] for each in document["environments"]} == set(pma_gym.ENVIRONMENTS)
+    assert {each["id"] for each in document["environments"]} == {*pma_gym.ENVIRONMENTS, RIG_ID}
     model = json.loads(run("info", "--model", "station", "--json")[1])
     assert len(model["parameters"]) == len(list(pma_gym.load_model("station").paths()))
 

@@ -220,7 +220,7 @@ def test_a_value_out_of_range_is_refused(value):
 
 def test_a_quantity_refuses_an_unknown_unit_and_reversed_bounds():
     for message, act in (
-        ("unknown unit 'psi'; add it to", lambda: Quantity("psi", 0, 1, "test")),
+        ("unknown unit 'psi'; write one of 1, %, V, ", lambda: Quantity("psi", 0, 1, "test")),
         ("bounds 2 to 1 kPa are reversed", lambda: Quantity("kPa", 2, 1, "test")),
         ("usual must lie in 0 to 1 kPa, got 2", lambda: Quantity("kPa", 0, 1, "test", usual=2)),
     ):

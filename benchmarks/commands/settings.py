@@ -94,6 +94,8 @@ def tune(
 ) -> None:
     """Tune the gains of the PIDs on a model; without --out, the shipped table of gains."""
     if tasks:
+        if out or only != "*":
+            refuse(ValueError("--tasks keeps settings in results/rigs: leave out --out and --only"))
         from rich.progress import Progress
 
         from benchmarks.rigs.run import chosen_controllers, rig_options

@@ -90,6 +90,22 @@ class Row:
 
 
 DISPLACEMENT, ROTATION = "pma_gym/IsokineticDisplacement-v0", "pma_gym/IsokineticRotation-v0"
+RIG = "pma_gym/Rig-v0"
+_MODELS, _VOLTS = "benchmarks/speed/models", {"winding_voltage": [-7.4, 7.4]}
+_PULSES = {"frequency_hz": 50.0, "opening_time_ms": 2.0, "closing_time_ms": 1.0}
+RIGS: dict[str, tuple[str, dict[str, Any]]] = {
+    "joint": ("5 states, friction, noise", {"model": f"{_MODELS}/joint.toml", "limits": _VOLTS}),
+    "slide": ("4 states, friction, noise", {"model": f"{_MODELS}/slide.toml"}),
+    "muscle_pair": ("10 states, two regulators", {"model": "muscle_pair"}),
+    "valve_pair": (
+        "11 states, two valves by averaged pulse width",
+        {
+            "model": "valve_pair",
+            "effects": {"pulse_width": _PULSES, "antagonist_pulse_width": _PULSES},
+        },
+    ),
+}
+"""What is in a rig, and options of its environment, by the keys of rows; models without a row."""
 COUNTS, ENVPOOL_COUNTS, SYNC_COUNTS = (1, 64, 1024, 16384, 262144), (64, 1024, 16384), (64, 1024)
 """Numbers of environments; EnvPool holds each as an object of its own, and copies in a Python loop
 are no cheaper by the dozen."""
@@ -104,6 +120,8 @@ def _single() -> Iterator[Row]:
     step = "10 ms; 11 states, sensors, noise, reward"
     yield Row("single/own", f"pma-gym, displacement: {step}", OWN, "one", {"name": DISPLACEMENT})
     yield Row("single/own_rotation", f"pma-gym, rotation: {step}", OWN, "one", {"name": ROTATION})
+    for rig, (step, options) in RIGS.items():
+        yield Row(f"single/{rig}", f"{rig}: 10 ms; {step}", OWN, "one", {"name": RIG, **options})
     for key, peer, name, step in (
         ("CartPole", OWN, "CartPole-v1", "20 ms; 4 states, one Euler step"),
         ("Pendulum", OWN, "Pendulum-v1", "50 ms; 2 states, one Euler step"),
@@ -130,6 +148,8 @@ def _batches() -> Iterator[Row]:
     own, two, classic = {"name": DISPLACEMENT}, {"name": DISPLACEMENT, "threads": 2}, "CartPole-v1"
     yield from _sizes("own", "pma-gym, 1 thread", OWN, "vector", own, COUNTS)
     yield from _sizes("own_two", "pma-gym, 2 threads", OWN, "vector", two, ENVPOOL_COUNTS)
+    for rig, (_, options) in RIGS.items():
+        yield from _sizes(rig, rig, OWN, "vector", {"name": RIG, **options}, SYNC_COUNTS)
     for toy in ("CartPole", "Pendulum"):
         named = {"name": f"{toy}-v1"}
         looped, title = named | {"mode": "sync"}, f"SyncVectorEnv {toy}"

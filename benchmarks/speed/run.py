@@ -37,11 +37,19 @@ ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_
 
 SINGLE, BATCH = "single/own", "batch/own/1024"
 
+TOY, TOYS = "single/CartPole", "batch/sync_Pendulum/1024"
+
 CHECKS = (
-    (SINGLE, "single/CartPole", 1.7),
-    (BATCH, "batch/sync_Pendulum/1024", 18.0),
+    (SINGLE, TOY, 1.7),
+    (BATCH, TOYS, 18.0),
     (BATCH, SINGLE, 3.0),
     ("batch/own_two/1024", BATCH, 1.5),
+    ("single/joint", TOY, 1.5),
+    ("single/slide", TOY, 1.5),
+    ("single/valve_pair", TOY, 0.5),
+    ("batch/joint/1024", TOYS, 15.0),
+    ("batch/slide/1024", TOYS, 15.0),
+    ("batch/valve_pair/1024", TOYS, 8.0),
 )
 """This package's row, a pattern of rows the fastest of which divides it, and the least ratio: what
 falls short when a step has more overhead, or a batch is no longer computed in lanes or by threads.

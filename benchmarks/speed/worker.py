@@ -72,9 +72,9 @@ def sampled(environment: Any, count: int) -> list[Any]:  # noqa: ANN401
     return [environment.action_space.sample() for _ in range(count)]
 
 
-def one(name: str, library: str = "gymnasium") -> Chunk:
+def one(name: str, library: str = "gymnasium", **options: Any) -> Chunk:
     """An environment as its library's `make` gives it."""
-    environment = importlib.import_module(library).make(name)
+    environment = importlib.import_module(library).make(name, **options)
     return single(environment, sampled(environment, ACTIONS))
 
 
@@ -239,6 +239,9 @@ if __name__ == "__main__":
     make, settings, seconds = sys.argv[1:]
     asked = json.loads(settings)
     if str(asked.get("name", "")).startswith("pma_gym/"):
-        import pma_gym  # noqa: F401 - registers the environments
+        import pma_gym  # Registers the environments.
+
+        if effects := asked.pop("effects", None):
+            asked["model"] = pma_gym.load_model(asked["model"]).with_effects(effects)
     steps, elapsed = measured(globals()[make](**asked), float(seconds))
     print("\n" + json.dumps({"steps": steps, "seconds": elapsed}))

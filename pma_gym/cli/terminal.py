@@ -24,7 +24,7 @@ from pma_gym import __version__
 from pma_gym.data.files.trial_files import TrialWarning, read_trial
 from pma_gym.data.trial import Trial
 from pma_gym.data.trial_schedule import SCHEDULES
-from pma_gym.envs import ENVIRONMENTS
+from pma_gym.envs import ENVIRONMENTS, RIG_ID
 from pma_gym.pages.document import TextTable
 from pma_gym.plant.model import Model, load_model, shipped_models
 from pma_gym.tasks import EVERY_TASK
@@ -144,11 +144,12 @@ def print_version(requested: bool) -> None:
 def installation() -> dict[str, Any]:
     """Versions, shipped models and registered environments."""
     versions = {name: metadata.version(name) for name in _PACKAGES}
+    environments = ENVIRONMENTS | {RIG_ID: "angle_steps, ... of any rig's signals"}
     models = [load_model(name) for name in shipped_models()]
     return {
         "versions": {"python": platform.python_version(), **versions},
         "models": [{"name": m.name, "plant": m.plant, "title": m.title} for m in models],
-        "environments": [{"id": name, "task": task} for name, task in ENVIRONMENTS.items()],
+        "environments": [{"id": name, "task": task} for name, task in environments.items()],
     }
 
 

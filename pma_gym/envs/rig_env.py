@@ -11,19 +11,22 @@ from gymnasium import spaces
 from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
+from pma_gym.data.signals import Signal
 from pma_gym.engine.option_checks import check_keywords
 from pma_gym.engine.rig.engine import RigCommands, RigEngine
+from pma_gym.engine.rig.layout import key
 from pma_gym.engine.rig.options import RigOptions, parse_rig_options, parse_rig_task
 from pma_gym.envs.episode import Episode
 from pma_gym.envs.kind import Kind
 from pma_gym.envs.member import BatchMember
 from pma_gym.envs.pma_env import PMAEnv
+from pma_gym.envs.rendering.scene import USUAL_WIDTH
 from pma_gym.envs.vector import PMAVectorEnv
 from pma_gym.plant.commands import Command
 from pma_gym.plant.model import Model
 from pma_gym.tasks import REWARDS, Task
 
-OWN = ("task", "goal", "render_mode")
+OWN = ("task", "goal", "render_mode", "render_width")
 """Keyword arguments of an environment in addition to the options."""
 
 RIG = Kind(parse_rig_options, parse_rig_task, RigEngine, lambda options, _: RigCommands(options))
@@ -101,13 +104,11 @@ class RigEpisode(Episode):
         """Return the action for commands (SI), within their limits."""
         return self._commands.action_of(commands)
 
-    def picture(self) -> NDArray[np.uint8]:
-        """Raise an error, because there is no picture of every rig.
-
-        Raises:
-            gymnasium.error.UnsupportedMode: always.
-        """
-        raise gym.error.UnsupportedMode("there is no picture of a rig; plot the info's numbers")
+    @property
+    def commanded(self) -> dict[Signal, float]:
+        """Commands of the last step (SI), by signal."""
+        signals = [command.signal for command in self.options.commands]
+        return {signal: self._number(key(signal)) for signal in signals}
 
 
 class RigEnv(RigEpisode, PMAEnv):  # type: ignore[misc]
@@ -145,7 +146,8 @@ class RigEnv(RigEpisode, PMAEnv):  # type: ignore[misc]
     Args:
         task: name of a task, or a Task; steps of the first signal if not given.
         goal: whether observations are dictionaries with goals.
-        render_mode: None; there is no picture of every rig.
+        render_mode: as of `PMAEnv`.
+        render_width: as of `PMAEnv`.
         options: keyword arguments, see `RigOptions` and `Options`.
 
     Example:
@@ -156,19 +158,18 @@ class RigEnv(RigEpisode, PMAEnv):  # type: ignore[misc]
         (50, 300000)
     """
 
-    metadata: dict[str, Any] = {"render_modes": [], "render_fps": 100}
-
     def __init__(
         self,
         task: str | Task | None = None,
         goal: bool = False,
         render_mode: str | None = None,
+        render_width: int = USUAL_WIDTH,
         **options: Any,
     ) -> None:
         """Check the options and compile the rig."""
         self.goal = goal
         check_keywords("RigEnv.__init__()", options, RigOptions.names(), OWN)
-        super().__init__(task, render_mode, **options)  # type: ignore[arg-type]
+        super().__init__(task, render_mode, render_width, **options)  # type: ignore[arg-type]
         if goal:
             box = spaces.Box(-np.inf, np.inf, (1,), np.float64)
             goals = {"achieved_goal": box, "desired_goal": copy.deepcopy(box)}
@@ -229,6 +230,14 @@ class RigEnv(RigEpisode, PMAEnv):  # type: ignore[misc]
 class RigMember(RigEpisode, BatchMember):  # type: ignore[misc]
     """View of one environment of a `RigVectorEnv`."""
 
+    def picture(self) -> NDArray[np.uint8]:
+        """Raise an error, because a batch of rigs keeps no courses.
+
+        Raises:
+            gymnasium.error.UnsupportedMode: always.
+        """
+        raise gym.error.UnsupportedMode("a batch of rigs has no pictures; make one with gym.make")
+
 
 class RigVectorEnv(PMAVectorEnv):
     """Run n `RigEnv` in parallel, with the same bits; see `PMAVectorEnv` for modes and threads.
@@ -260,6 +269,11 @@ class RigVectorEnv(PMAVectorEnv):
         **options: Any,
     ) -> None:
         """Check the options and compile."""
+        if "goal" in options:
+            raise ValueError(
+                "a batch has no goal observations: make single environments, as with "
+                'vectorization_mode="sync", and leave goal out here'
+            )
         check_keywords("RigVectorEnv.__init__()", options, RigOptions.names(), OWN)
         given: Any = (num_envs, task, autoreset_mode, threads, precision, None, render_mode)
         super().__init__(*given, **options)

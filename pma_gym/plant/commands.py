@@ -55,9 +55,12 @@ def commands(model: Model, limits: Limits | None = None) -> list[Command]:
         model: the model.
         limits: lowest and highest command (SI) by name, where the model has none or wider ones.
     Raises:
-        ValueError: no limits, limits of an unknown command, or limits that are no interval.
+        ValueError: no command, no limits, limits of an unknown one, or limits that are no interval.
     """
     known, lines = dict(limits or {}), _lines(model)
+    if not lines:
+        drives = ", ".join(f"[{each.effect}]" for each in model.rig.commands)
+        raise ValueError(f"model {model.name} takes no command: give it one of {drives}")
     for name in known:
         if name not in lines:
             raise ValueError(
@@ -69,10 +72,11 @@ def commands(model: Model, limits: Limits | None = None) -> list[Command]:
 def _lines(model: Model) -> dict[str, Line]:
     """Place, gain, offset and ends of the input of every command, by its signal."""
     endless = -math.inf, math.inf
-    taken = [each for each in model.rig.commands if each.effect in model.parameters]
-    if taken:
+    if model.rig.commands:
         lines = {}
-        for each in taken:
+        for each in model.rig.commands:
+            if each.effect not in model.parameters:
+                continue
             place, line = COMMANDS[each.slot], model.parameters[each.effect]
             lines[each.wish or each.name] = (
                 _line(place, line, each.is_signed)

@@ -188,7 +188,10 @@ class Plant(CompiledModel):
         return {"model": self.model.name, "noise": str(noise), "seed": str(seed)}
 
     def linearize(
-        self, pressure: float, contraction: float | None = None, direction: str = "relaxing"
+        self,
+        pressure: float | None = None,
+        contraction: float | None = None,
+        direction: str = "relaxing",
     ) -> "control.StateSpace":
         """Linearise about an equilibrium; see `pma_gym.plant.forms.linear.linearize`."""
         # Imported here: python-control takes longer to import than all of this package.

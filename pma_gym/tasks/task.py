@@ -117,7 +117,7 @@ class Task:
         name = self.name.replace("_", " ")
         if self.name in TASKS:
             return f"Isokinetic {name}"
-        contracts = self.schedule.followed.shortens
+        contracts = self.schedule.followed.shortens and "contraction" not in name
         return name.capitalize() + (" contraction" if contracts else "")
 
     @property

@@ -4,7 +4,7 @@ import copy
 import json
 import pickle
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import gymnasium as gym
 import numpy as np
@@ -51,6 +51,7 @@ OPTIONS = {
     "slide": {"model": SLIDE, "span": 0.05},
 } | {model.plant: {"model": name} for name in shipped_models() for model in [load_model(name)]}
 """Options of an environment of every rig, by its name."""
+VALVES = load_model("valve_pair")
 MOVED = ("inertia.inertia_kg_m2", "slide.mass_kg", "lvdt.noise_mm")
 """Parameters that are drawn, the first that a model has."""
 
@@ -96,6 +97,29 @@ def test_checkers_find_nothing(options, recwarn):
     check_sb3(RigEnv(goal=True, **options))
     # Gymnasium says that a Box of commands could be narrower, and knows none of the goals' ranges.
     assert [str(w.message) for w in recwarn if "not within" in str(w.message)] == []
+
+
+def test_its_picture_shows_rig_and_course_and_comes_back(options):
+    env = RigEnv(render_mode="rgb_array", render_width=400, **options)
+    env.reset(seed=0)
+    start = env.render()
+    acted(env, 30)
+    later = env.render()
+    assert start.shape == (200, 400, 3) and start.dtype == np.uint8
+    for part in (np.s_[:, :185], np.s_[:100, 215:], np.s_[100:, 215:]):
+        assert np.any(start[part] != later[part])
+    env.reset(seed=0)
+    np.testing.assert_array_equal(env.render(), start)
+
+
+@pytest.mark.parametrize("rig", ["joint", "muscle_joint", "muscle_pair"])
+def test_a_drawn_arm_hangs_at_zero_and_its_reference_is_across_at_a_right_angle(rig):
+    env = RigEnv(tracking("angle", Across()), render_mode="rgb_array", **OPTIONS[rig])
+    env.reset(seed=0)
+    drawn = env.render()[:, :376].astype(int)
+    mark = np.argwhere(np.all(np.abs(drawn - [0xE0, 0x7B, 0x00]) < 8, axis=2)).mean(axis=0)
+    # The axis is at row 175, column 188; the mark beyond the arm's end, on the right.
+    np.testing.assert_allclose(mark, [175.0, 327.0], atol=4.0)
 
 
 def test_it_moves_as_the_plant_does(options):
@@ -276,11 +300,31 @@ def test_an_episode_ends_beyond_a_bound():
         ({"load": [1.0]}, "load must be a number or two"),
         ({"compiled": False}, "unexpected keyword argument 'compiled'"),
         ({"reference": ["speed_steps"]}, "speed_steps differs"),
+        ({"reference": "rand"}, "'rand' is no task of this rig, such as angle_steps_3"),
+        ({"model": replace(JOINT, parameters={k: v for k, v in VALVES.parameters.items()
+                                              if "valve" not in k}, plant="muscle_pair")},
+         "takes no command: give it one of [regulator_line], [valve_spool]"),
     ],
 )  # fmt: skip
 def test_what_cannot_be_is_refused_with_the_fix(given, words):
     with pytest.raises((ValueError, TypeError), match=re.escape(words)):
         RigEnv(**OPTIONS["joint"] | given)
+
+
+def test_a_batch_says_that_it_has_no_goals():
+    with pytest.raises(ValueError, match='vectorization_mode="sync"'):
+        RigVectorEnv(2, goal=True, **OPTIONS["joint"])
+
+
+@pytest.mark.parametrize("kind", ["steps", "ramps", "sine", "multisine"])
+@pytest.mark.parametrize("rig", ["muscle_joint", "muscle_pair"])
+def test_pressures_within_their_limits_hold_every_reference_of_an_arm(rig, kind):
+    env = RigEnv(f"angle_{kind}", model=rig)
+    first, *second = env.options.commands
+    rest = Plant(rig).settle(*(each.low for each in second), regulator_voltage=first.high)
+    highest = Plant(rig).observe(rest.state[None, :], rest.zero_contraction)["angle"][0]
+    phase = env.task.schedule.phases[0]
+    assert 0.6 * highest < phase.reference(phase.times).max() < highest
 
 
 def test_a_station_refuses_the_task_of_a_rig():
@@ -305,6 +349,14 @@ def test_parameters_are_drawn_from_ranges_or_a_covariance():
     env = RigVectorEnv(9, randomisation=Uncertainty(paths, covariance), **OPTIONS["joint"])
     env.reset(seed=1)
     assert len({env.member(i).plant.model.parameters["inertia"].inertia for i in range(9)}) == 9
+
+
+@dataclass(frozen=True)
+class Across:
+    """A quarter of a turn, all the time."""
+
+    def __call__(self, time):
+        return 0.5 * np.pi + 0.0 * np.asarray(time)
 
 
 @dataclass(frozen=True)

@@ -5,6 +5,7 @@ import re
 import tomllib
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -17,9 +18,12 @@ from pma_gym.data.files.trial_files import read_trial, write_trial
 from pma_gym.data.trial import Trial
 from pma_gym.data.trial_columns import BY_QUANTITY
 from pma_gym.discovery.preparation.prepared_trials import prepared
+from pma_gym.discovery.selection.profile_limits import limits
 from pma_gym.effects import CATALOGUE
 from pma_gym.effects.effect import ANTAGONIST
+from pma_gym.estimation.logged import Logged
 from pma_gym.plant.model import Model, ModelError, dump_model
+from pma_gym.plant.sensors import voltages
 
 PAIR = load_model("muscle_pair")
 FRICTIONLESS = ("joint_friction", "hysteresis", "antagonist_hysteresis")
@@ -229,12 +233,31 @@ def test_a_simulation_beyond_the_joints_range_says_so(tmp_path, capsys, monkeypa
     assert re.search(r"pressure_kpa goes from 200 to 560, beyond the 0 to 500", said)
 
 
-def test_logs_of_a_pair_keep_their_commands_in_a_diagnosis():
+def test_logs_of_a_pair_are_volts_in_a_diagnosis_as_a_stations_are():
     time = 0.01 * np.arange(20)
     asked = {"pressure_command": np.full(20, 3e5), "antagonist_pressure_command": np.full(20, 2e5)}
     trial = Plant(PAIR).simulate(Trial(time, asked))
     ((kept, *_), _) = prepared([NamedTrial("a", trial), NamedTrial("b", trial)], PAIR)
-    assert kept.trial.commands.keys() == asked.keys()
+    # So that another line of the regulator is another pressure, whose size the logs determine.
+    other = PAIR.replace({"antagonist_regulator_line.gain_kpa_per_v": 55.0})
+    np.testing.assert_array_equal(voltages(other, kept.trial), voltages(PAIR, trial))
+
+
+def test_a_speed_beyond_a_pairs_trials_is_a_limit_of_its_law():
+    time = 0.01 * np.arange(200)
+    swing = 5e4 * np.sin(6.0 * time)
+    asked = {"pressure_command": 2e5 + swing, "antagonist_pressure_command": 2e5 - swing}
+    trial = Plant(PAIR).simulate(Trial(time, asked), noise=False)
+    whitened = SimpleNamespace(logged=[Logged.of(PAIR, 1, trial)], readings=lambda _: [None])
+    problem = SimpleNamespace(whitened_at=lambda *_: whitened)
+    path = "joint_friction.stribeck_speed_deg_per_s"
+    _, high = limits(problem, SimpleNamespace(values=None), (), path)
+    fastest = np.degrees(np.abs(np.gradient(trial.measurements["angle"], time)).max())
+    assert high == pytest.approx(30.0 * fastest)
+
+
+def test_shut_valves_leave_the_mass_of_air_as_two_integrators():
+    assert np.sum(np.abs(Plant("valve_pair").linearize().poles()) < 1e-5) == 2
 
 
 PAGE = (Path(__file__).parents[2] / "docs" / "muscle-labs.md").read_text(encoding="utf-8")

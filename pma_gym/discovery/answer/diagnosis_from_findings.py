@@ -95,7 +95,7 @@ def amended_model(findings: Findings, verdict: Verdict) -> Model:
         notes[path] = Note("not determined by the trials: held where its law is at a limit")
     return replace(
         fit.model,
-        name=f"{findings.given.name}amended_model",
+        name=f"{findings.given.name}_amended",
         title=f"{findings.given.title}; amended by a diagnosis",
         notes=notes,
     )

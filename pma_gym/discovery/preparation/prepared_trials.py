@@ -57,10 +57,13 @@ def _in_volts(trial: Trial, model: Model) -> Trial:
 
     What a drive takes as it comes keeps its name.
     """
-    if model.rig.imposes_motion or model.rig.commands:
+    if model.rig.imposes_motion:
         # A record of positions is smoothed whenever a model reads it.
         return trial
     motor, regulator = sensors.voltages(model, trial)
+    if model.rig.commands:
+        active = zip(sensors.active_commands(model), (motor, regulator), strict=True)
+        return replace(trial, commands={each.name: values for each, values in active if each})
     direct = sensors.direct_command(model)
     if direct:
         return replace(trial, commands={direct: motor})

@@ -21,6 +21,13 @@ does; and the share of it that does what none does."""
 LEAST_ROWS = 3
 """Fewest readings from which a speed is taken."""
 
+UNITS = {
+    "displacement": (("mm", "um"), ("mm/s",)),
+    "angle": (("deg",), ("deg/s",)),
+    "pressure": (("kPa",), ()),
+}
+"""Units of parameters that are a travel of a signal, and its speed, by what it measures."""
+
 Array = NDArray[np.float64]
 
 
@@ -46,7 +53,7 @@ def limits(
 def _scales(
     problem: FitProblem, fit: Fitted, chosen: tuple[CandidateEffect, ...]
 ) -> dict[str, float]:
-    """The largest travel, speed, time and pressure in the trials, by the units they are given in.
+    """The largest travel, speed, time and pressure in the trials, by the units of parameters.
 
     Force over speed or over travel needs none of its own: a force is an amplitude.
     """
@@ -54,23 +61,24 @@ def _scales(
     readings = whitened.readings(fit.values)
     if readings is None:
         return {}
-    travel, speed, pressure, seconds = 0.0, 0.0, 0.0, 0.0
+    largest: dict[str, float] = {}
     for held, logged in zip(readings, whitened.logged, strict=True):
-        # A model that lacks much may run away; what was measured did not.
-        contraction, time = _known(logged, held, "displacement")
-        travel = max(travel, float(np.ptp(contraction)))
-        speed = max(speed, float(np.abs(np.gradient(contraction, time)).max()))
-        pressure = max(pressure, float(np.ptp(_known(logged, held, "pressure")[0])))
-        seconds = max(seconds, float(logged.time[-1] - logged.time[0]))
-    si = {"mm": travel, "um": travel, "mm/s": speed}
-    si |= {"kPa": pressure, "s": seconds, "ms": seconds}
-    return {name: size / SI_FACTORS[name] for name, size in si.items() if size > 0.0}
+        sizes = dict.fromkeys(("s", "ms"), float(logged.time[-1] - logged.time[0]))
+        for measures in (("displacement", "angle"), ("pressure",)):
+            channel = logged.channel(*measures)
+            if channel is None:
+                continue
+            # A model that lacks much may run away; what was measured did not.
+            values, time = _known(logged, held, channel)
+            travels, speeds = UNITS[logged.signals[channel].measures]
+            sizes |= dict.fromkeys(travels, float(np.ptp(values)))
+            sizes |= dict.fromkeys(speeds, float(np.abs(np.gradient(values, time)).max()))
+        largest = {name: max(size, largest.get(name, 0.0)) for name, size in sizes.items()}
+    return {name: size / SI_FACTORS[name] for name, size in largest.items() if size > 0.0}
 
 
-def _known(logged: Logged, held: Array, measures: str) -> tuple[Array, Array]:
+def _known(logged: Logged, held: Array, channel: int) -> tuple[Array, Array]:
     """A signal (SI) as measured, else as simulated, and the times (s) of its readings."""
-    channel = logged.channel(measures)
-    assert channel is not None
     there = np.full(len(logged.time), bool(logged.measures[channel]))
     there[logged.missing[channel]] = False
     if there.sum() < LEAST_ROWS:

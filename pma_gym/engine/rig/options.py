@@ -11,11 +11,16 @@ from pma_gym.engine.option_checks import check_number, is_real
 from pma_gym.engine.options import Options, draw_task, parse_options
 from pma_gym.integrator.equations import COMMANDS
 from pma_gym.plant.commands import Command, Limits, commands
+from pma_gym.plant.equilibrium.solver import equilibria_at
 from pma_gym.plant.model import load_model
 from pma_gym.plant.plant import Plant
 from pma_gym.plant.statics import Condition
 from pma_gym.tasks import KINDS, Disturbances, Ranges, Task, TrackingTask, as_tracking
 from pma_gym.tasks import named_tracking as named
+from pma_gym.tasks.tracking import SPANS
+
+REACHED = 0.9
+"""Share of the way to the furthest angle that is the range of a reference (assumption)."""
 
 STATION_ONLY = ("pressure_kpa", "memory_at_start", "regulator_action", "disturbances") + (
     "operator",
@@ -34,7 +39,8 @@ class RigOptions(Options):
         rest: commands (SI) by name with which an episode begins at rest; 0, of a pressure the
             middle of its limits, if not given.
         bounds: lowest and highest value (SI) of signals by name, beyond which an episode ends.
-        span: range of the reference (SI), which errors are in percent of; by the signal if 0.
+        span: range of the reference (SI), which errors are in percent of; if 0 by the signal, and
+            by what muscles reach with an arm.
         duration_s: duration of an episode (s).
         load: force or torque (N, N m) on what moves, positive as the position grows; or lowest and
             highest, drawn at every reset.
@@ -147,7 +153,27 @@ def starts(options: RigOptions) -> dict[str, float]:
 
 def named_task(name: str, options: RigOptions, start: Mapping[str, float]) -> TrackingTask | None:
     """The task of a name such as `angle_steps_3`, or None."""
-    return named(name, options.signals, start.__getitem__, options.span, options.duration_s)
+    span = options.span
+    if not span and name.startswith("angle_") and "joint_range" in options.nominal.parameters:
+        reach = REACHED * (furthest_angle(options) - start["angle"])
+        span = max(min(SPANS["angle"], reach), 0.0)
+    return named(name, options.signals, start.__getitem__, span, options.duration_s)
+
+
+def furthest_angle(options: RigOptions) -> float:
+    """Greatest angle (rad) at which the commands hold an arm of the nominal model.
+
+    Where no command moves it at rest, all of the joint's range counts.
+    """
+    plant, lines = Plant(options.nominal), {each.place: each for each in options.commands}
+    ends = [
+        np.linspace(lines[place].low, lines[place].high, 21) if place in lines else np.zeros(1)
+        for place in COMMANDS
+    ]
+    motor, regulator = (each.ravel() for each in np.meshgrid(*ends))
+    angles = equilibria_at(plant, motor, regulator)[1]
+    held = np.unique(angles[np.isfinite(angles)])
+    return float(held[-1]) if len(held) > 1 else plant.parameters["joint_range"].highest
 
 
 def parse_rig_task(given: str | Task | None, options: RigOptions) -> TrackingTask:
@@ -182,4 +208,14 @@ def draw_rig_task(
     start: Mapping[str, float],
 ) -> Task:
     """Draw the task of an episode; see `draw_task`."""
-    return draw_task(task, reference, generator, lambda name: named_task(name, options, start))
+
+    def known(name: str) -> TrackingTask:
+        drawn = named_task(name, options, start)
+        if drawn is None:
+            raise ValueError(
+                f"reference: {name!r} is no task of this rig, such as "
+                f'{options.signals[0].name}_steps_3; "random" draws another seed of such a task'
+            )
+        return drawn
+
+    return draw_task(task, reference, generator, known)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pma_gym.envs.rendering.scene import History, Scene
-from pma_gym.tasks import Task
+from pma_gym.tasks import Task, TrackingTask
 
 if TYPE_CHECKING:
     from pma_gym.envs.rendering.picture import Picture
@@ -144,9 +144,12 @@ class Display:
         """Return the present picture of an environment, see `Picture.draw`."""
         if self._picture is None:
             # Imported here: an environment without pictures needs no matplotlib.
+            from pma_gym.envs.rendering.any_rig import RigPicture
             from pma_gym.envs.rendering.picture import Picture
 
-            self._picture = Picture(self._task, self._width)
+            made = self._task, self._width
+            is_any = isinstance(self._task, TrackingTask)
+            self._picture = RigPicture(*made, scene.options) if is_any else Picture(*made)
         return self._picture.draw(scene, history)
 
     def show(self, environment: Pictured) -> None:

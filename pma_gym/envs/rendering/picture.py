@@ -38,16 +38,19 @@ class Picture:
         width: width of the picture (pixels); it is half as high.
     """
 
+    _unit, _ends, _line = "", (), (1.0, 0.0)
+    _command, _command_ends = "", (0.0, 10.0)
+
     def __init__(self, task: Task, width: int = USUAL_WIDTH) -> None:
         """Draw the static background."""
-        self._factor = SI_FACTORS[task.schedule.unit]
+        self._factor = SI_FACTORS[self._unit or task.schedule.unit]
         self._figure = Figure(
             figsize=(USUAL_WIDTH / DPI, 0.5 * USUAL_WIDTH / DPI),
             dpi=DPI * width / USUAL_WIDTH,
             facecolor="white",
         )
         self._canvas = FigureCanvasAgg(self._figure)
-        self._rig = RigDrawing(self._figure.add_axes((0.0, 0.0, 0.47, 1.0)), task)
+        self._rig = self._drawing(self._figure.add_axes((0.0, 0.0, 0.47, 1.0)), task)
         self._moving: list[tuple[Axes, Artist]] = [(self._rig.axes, a) for a in self._rig.moving]
         self._add_position_plot(task)
         self._add_voltage_plot(task)
@@ -71,11 +74,15 @@ class Picture:
         self._actual.set_data(history.time[::stride], history.position[::stride] / self._factor)
         self._now.set_data([scene.time], [scene.position / self._factor])
         volts = np.append(history.voltages, history.voltages[-1:])
-        self._volts.set_data(np.arange(len(volts)) * scene.options.period, volts)
+        gain, offset = self._line
+        self._volts.set_data(np.arange(len(volts)) * scene.options.period, gain * volts + offset)
         self._canvas.restore_region(self._still)
         for axes, artist in self._moving:
             axes.draw_artist(artist)
         return np.asarray(self._canvas.buffer_rgba())[..., :3].copy()
+
+    def _drawing(self, axes: Axes, task: Task) -> RigDrawing:
+        return RigDrawing(axes, task)
 
     def _add_position_plot(self, task: Task) -> None:
         schedule = task.schedule
@@ -92,10 +99,11 @@ class Picture:
         (self._actual,) = axes.plot([], [], color=ACTUAL, lw=1.8, label=f"true {schedule.quantity}")
         (self._now,) = axes.plot([], [], "o", color=ACTUAL, ms=5)
         # An excess lies on either side of what is prescribed.
-        lowest, highest = (-1.2, 2.4) if schedule.followed.is_force else (-0.12, 1.2)
-        span = schedule.span / self._factor
-        axes.set_ylim(lowest * span, highest * span)
-        axes.set_ylabel(f"{_AXIS.get(schedule.quantity, schedule.quantity)} ({schedule.unit})")
+        shares = (-1.2, 2.4) if schedule.followed.is_force else (-0.12, 1.2)
+        ends = self._ends or [share * schedule.span for share in shares]
+        axes.set_ylim(*(end / self._factor for end in ends))
+        unit = self._unit or schedule.unit
+        axes.set_ylabel(f"{_AXIS.get(schedule.quantity, schedule.quantity)} ({unit})")
         axes.tick_params(labelbottom=False)
         axes.legend(
             loc="lower right",
@@ -110,9 +118,10 @@ class Picture:
 
     def _add_voltage_plot(self, task: Task) -> None:
         axes = self._plot((0.545, 0.13, 0.435, 0.27), task)
-        axes.set_ylim(-0.5, 10.5)
-        axes.set_yticks([0, 5, 10])
-        axes.set_ylabel(f"{task.actuator} (V)")
+        low, high = self._command_ends
+        axes.set_ylim(1.05 * low - 0.05 * high, 1.05 * high - 0.05 * low)
+        axes.set_yticks([low, 0.5 * (low + high), high])
+        axes.set_ylabel(self._command or f"{task.actuator} (V)")
         axes.set_xlabel("time (s)")
         (self._volts,) = axes.plot([], [], color=VOLTAGE, lw=1.2, drawstyle="steps-post")
         self._moving.append((axes, self._volts))

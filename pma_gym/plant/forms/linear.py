@@ -32,7 +32,7 @@ _AWAY = 1e-6
 
 def linearize(
     plant: CompiledModel,
-    pressure: float,
+    pressure: float | None = None,
     contraction: float | None = None,
     direction: str = "relaxing",
 ) -> "control.StateSpace":
@@ -44,7 +44,8 @@ def linearize(
 
     Args:
         plant: the plant.
-        pressure: gauge pressure (Pa).
+        pressure: gauge pressure (Pa); None for a command of 0: a rig without a regulator, or shut
+            valves at the pressure with which the model begins.
         contraction: shortening from the resting length (m), less than without load; of a joint
             with two muscles its angle (rad), which the second one holds. None for the equilibrium
             without a command to motor or second muscle.
@@ -122,14 +123,14 @@ def _seen(plant: CompiledModel) -> tuple[str, ...]:
 
 
 def operating_point(
-    plant: CompiledModel, pressure: float, contraction: float | None
+    plant: CompiledModel, pressure: float | None, contraction: float | None
 ) -> tuple[Condition, tuple[float, float]]:
     """Find the condition at rest at a contraction, and the voltages that hold it.
 
     Raises:
         ValueError: no voltage of 0-10 V holds it; with the range of possible contractions.
     """
-    regulator = plant.regulator_voltage(pressure)
+    regulator = 0.0 if pressure is None else plant.regulator_voltage(pressure)
     motor = 0.0 if contraction is None else _holding_voltage(plant, regulator, contraction)
     return equilibrium_at(plant, motor, regulator), (motor, regulator)
 

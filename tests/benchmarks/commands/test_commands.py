@@ -60,6 +60,11 @@ def test_a_file_that_cannot_be_written_is_refused_at_once(
     assert sorted(tmp_path.rglob("*")) == before
 
 
+def test_tuning_on_tasks_of_any_rig_keeps_its_settings_in_no_file_of_gains(nothing_runs):
+    done = CliRunner().invoke(app, ["tune", "--tasks", "angle_sine", "--out", "gains.toml"])
+    assert done.exit_code == 2 and "results/rigs: leave out --out and --only" in done.stderr
+
+
 def test_ctrl_c_leaves_what_is_done_and_says_how_it_goes_on(tmp_path, monkeypatch):
     monkeypatch.setattr(run, "compile_kernels", lambda suite: None)
     monkeypatch.setattr(run, "execute", lambda *_: False)

@@ -15,6 +15,8 @@ from benchmarks.speed.peers import ENVPOOL, GYMNAX, OWN, PEERS, Row, all_rows
 
 CHECKED = {"single/own": 30.0, "single/CartPole": 10.0, "batch/own/1024": 100.0}
 CHECKED |= {"batch/own_two/1024": 190.0, "batch/sync_Pendulum/1024": 5.0}
+CHECKED |= {"single/joint": 15.0, "single/slide": 15.0, "single/valve_pair": 6.0}
+CHECKED |= dict.fromkeys((f"batch/{rig}/1024" for rig in ("joint", "slide", "valve_pair")), 90.0)
 
 
 def test_rows_peers_pins_and_targets_fit_together():
@@ -76,6 +78,7 @@ def test_an_environment_that_ends_is_reset_and_a_batch_takes_other_actions():
     [
         (Row("a/b", "b", OWN, "one", {"name": "CartPole-v1"}), ""),
         (Row("a/b", "b", OWN, "vector", {"name": peers.DISPLACEMENT, "count": 2}), ""),
+        *((row, "") for row in all_rows() if row.key in map("single/{}".format, peers.RIGS)),
         (Row("a/b", "b", OWN, "one", {"name": "Nothing-v1"}), "exit code 1: .*Nothing"),
         (Row("a/b", "b", OWN, "one", {"threads": 99999}), "needs 99999 cores"),
         (Row("a/b", "b", GYMNAX, "gymnax"), "gymnax is not installed .*`make peers`"),
@@ -120,6 +123,7 @@ def speed(*arguments):
     [
         (CHECKED, 2, ""),
         (CHECKED | {"single/CartPole": 20.0}, 2, "single/own over single/CartPole"),
+        (CHECKED | {"single/valve_pair": 4.9}, 2, "single/valve_pair over single/CartPole"),
         (CHECKED | {"batch/own_two/1024": 110.0}, 2, "batch/own_two/1024 over batch/own/1024"),
         (CHECKED | {"batch/own_two/1024": 110.0}, 1, ""),
         (CHECKED | {"batch/sync_Pendulum/1024": 6.0}, 2, "over batch/sync_Pendulum/1024"),
