@@ -17,6 +17,7 @@ from benchmarks.commands.options import (
 from benchmarks.executors.choice import executor_named
 from benchmarks.executors.executor import Executor
 from benchmarks.files import RESULTS
+from benchmarks.rigs.suite import JOINT
 from pma_gym.cli.options import JsonOption
 from pma_gym.cli.terminal import print_json, print_table
 
@@ -95,6 +96,15 @@ def run(
         return
     if not suite:
         raise ValueError("run needs --suite NAME, or --model FILE for any rig")
+    if suite == JOINT:
+        from benchmarks.rigs.joint import run_joint
+
+        if traces:
+            raise ValueError(f"suite {JOINT} writes no time series; leave --traces out")
+        chosen_ones = [] if controllers == "all" else listed(controllers)
+        places = executor_named(executor, jobs)
+        run_joint(chosen_ones, stations, listed(task), out or RESULTS / JOINT, places)
+        return
     from benchmarks.comparison.job import run_comparison
     from benchmarks.reproduction.reproduce import run_job
     from benchmarks.suites.reproduction import ReproductionSuite
