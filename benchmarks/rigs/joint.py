@@ -87,23 +87,16 @@ def _case(score: Score) -> RigCase:
 
 
 def score_case(case: RigCase, names: Sequence[str], settings: Settings) -> list[Score]:
-    """Score controllers on a case; one that raises an error misses the whole range."""
-    suite = joint_suite()
-    rows = []
-    for name in names:
-        try:
-            rows.append(_scored(suite, case, name, settings))
-        except (ArithmeticError, ValueError) as error:
-            missed = MISSED, suite.training(case.rig)["span"], reason(error), 0.0
-            rows.append(Score(case.rig, name, *case[1:], *missed))
-    return rows
+    """Score controllers on a case, of the oracle's the best."""
+    every = (_scores(joint_suite(), case, name, settings) for name in names)
+    return [min(scores, key=lambda score: score.percent) for scores in every]
 
 
-def _scored(suite: RigSuite, case: RigCase, name: str, settings: Settings) -> Score:
+def _scores(suite: RigSuite, case: RigCase, name: str, settings: Settings) -> list[Score]:
+    """Scores of a controller, of the oracle's all; who raises an error misses the whole range."""
     options, nominal = suite.options(case), None
     rivals = [RIG_CONTROLLERS[each](settings[each]) for each in settings if name in (each, ORACLE)]
     if name == ORACLE:
-        # Whoever does best with the true numbers and without noise.
         options |= {"noise": False}
         nominal = suite.station(case.rig, case.station)
     elif name == POLICY:
@@ -112,10 +105,14 @@ def _scored(suite: RigSuite, case: RigCase, name: str, settings: Settings) -> Sc
     env = RigEnv(suite.tasks[case.task]["reference"], **options)
     scores = []
     for rival in rivals:
-        info, _, spent = run_episode(env, rival, case.station, nominal)
-        figures = float(info["percent_of_range"]), float(info[f"rmse_{env.task.schedule.suffix}"])
-        scores.append(Score(case.rig, name, *case[1:], *figures, env.ended_by, 1e6 * spent))
-    return min(scores, key=lambda score: score.percent)
+        try:
+            info, _, spent = run_episode(env, rival, case.station, nominal)
+            rmse = float(info[f"rmse_{env.task.schedule.suffix}"])
+            figures = float(info["percent_of_range"]), rmse, env.ended_by, 1e6 * spent
+        except (ArithmeticError, ValueError) as error:
+            figures = MISSED, options["span"], reason(error), 0.0
+        scores.append(Score(case.rig, name, *case[1:], *figures))
+    return scores
 
 
 def suite_settings(
@@ -224,6 +221,8 @@ def run_joint(
 
             run_or_raise(works, executor, keep)
     scores = [rows[case, name] for case in cases for name in names if (case, name) in rows]
+    if not scores:
+        raise ValueError(f"{', '.join(names)} apply to no rig of suite {JOINT}; name another one")
     write_leaderboard(suite, scores, out)
     return scores
 
@@ -251,8 +250,9 @@ def standings_on(suite: RigSuite, scores: Sequence[Score], rigs: Sequence[str]) 
 
 def write_leaderboard(suite: RigSuite, scores: Sequence[Score], out: Path) -> None:
     """Write `scores.csv`, `report.html` and `report.md`, and print the ranks."""
-    groups = [suite.rigs, *([rig] for rig in suite.rigs)]
-    standings = [standings_on(suite, scores, rigs) for rigs in groups]
+    rigs = list(dict.fromkeys(score.rig for score in scores))
+    standings = [standings_on(suite, scores, each) for each in (rigs, *([rig] for rig in rigs))]
+    done, planned = len({_case(score) for score in scores}), len(suite.cases())
     ranks = ranks_table(standings, {})
     blocks: list[Block] = [
         Heading(suite.document["title"], 1),
@@ -262,7 +262,9 @@ def write_leaderboard(suite: RigSuite, scores: Sequence[Score], out: Path) -> No
         *(standings_table(each, {}) for each in standings),
         pair_table(standings[0], {}),
         score_table(scores),
-        Paragraph(f"Version {suite.document['version']}, digest {suite.digest}."),
+        Paragraph(
+            f"Version {suite.document['version']} ({suite.digest}), {done} of {planned} cases."
+        ),
     ]
     write_text(out / "scores.csv", csv_text([Score._fields, *scores]))
     write_text(out / "report.html", to_html(blocks, {}))
