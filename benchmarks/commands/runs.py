@@ -17,7 +17,6 @@ from benchmarks.commands.options import (
 from benchmarks.executors.choice import executor_named
 from benchmarks.executors.executor import Executor
 from benchmarks.files import RESULTS
-from benchmarks.rigs.suite import JOINT
 from pma_gym.cli.options import JsonOption
 from pma_gym.cli.terminal import print_json, print_table
 
@@ -96,6 +95,8 @@ def run(
         return
     if not suite:
         raise ValueError("run needs --suite NAME, or --model FILE for any rig")
+    from benchmarks.suites.suite import JOINT
+
     if suite == JOINT:
         from benchmarks.rigs.joint import run_joint
 

@@ -97,7 +97,8 @@ def tune(
 ) -> None:
     """Tune the gains of the PIDs on a model; without --out, the shipped table of gains."""
     if suite:
-        from benchmarks.rigs.joint import JOINT, tune_joint
+        from benchmarks.rigs.joint import tune_joint
+        from benchmarks.suites.suite import JOINT
 
         if suite != JOINT:
             raise ValueError(

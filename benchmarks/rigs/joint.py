@@ -26,10 +26,10 @@ from benchmarks.report.tables import pair_table, ranks_table, standings_table
 from benchmarks.rigs.from_logs import settings_of
 from benchmarks.rigs.policy import SEES, AnyReference, RigPolicy, train
 from benchmarks.rigs.score import Score, info_of, run_episode, score_table
-from benchmarks.rigs.suite import JOINT, ORACLE, POLICY, RigCase, RigSuite, joint_suite
+from benchmarks.rigs.suite import ORACLE, POLICY, RigCase, RigSuite, joint_suite
 from benchmarks.runner.fingerprint import code_digest_with
 from benchmarks.runner.journal import JOURNAL, Journal
-from benchmarks.suites.suite import Episode
+from benchmarks.suites.suite import JOINT, Episode
 from controllers.rigs import RIG_CONTROLLERS
 from pma_gym.cli.terminal import print_table
 from pma_gym.documents import read_toml
@@ -244,7 +244,7 @@ def standings_on(suite: RigSuite, scores: Sequence[Score], rigs: Sequence[str]) 
     )
     values = np.array([[rows[case].percent for case in cases] for rows in whole.values()])
     failed = tuple(sum(bool(row.ended_by) for row in rows.values()) for rows in whole.values())
-    name = rigs[0] if len(rigs) == 1 else "all rigs"
+    name = rigs[0].replace("_", " ") if len(rigs) == 1 else "all rigs"
     return Standings(Errors(Measure(name, (), PERCENT), tuple(whole), episodes, values), failed)
 
 

@@ -15,9 +15,6 @@ from pma_gym.documents import read_toml
 from pma_gym.plant.model import Model, load_model
 from pma_gym.tasks import Ranges
 
-JOINT = "joint"
-"""Name of the suite."""
-
 ORACLE, POLICY = "oracle", "policy"
 """Names of who is no controller of `RIG_CONTROLLERS`."""
 

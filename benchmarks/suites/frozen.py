@@ -9,11 +9,11 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from benchmarks.rigs.suite import JOINT
 from benchmarks.runner.controller_spec import ControllerSpec
 from benchmarks.suites.reproduction import GOAL_FIGURES, Goals, ReproductionSuite
 from benchmarks.suites.stations import Recipe, parse_recipe
 from benchmarks.suites.suite import (
+    JOINT,
     NOMINAL,
     SUITES,
     Entry,
