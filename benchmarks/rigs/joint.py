@@ -53,7 +53,8 @@ WHO = (
     "Controllers receive the nominal model. They were tuned, and the policies trained, on other "
     "stations. The oracle is whichever controller does best with the station's true numbers and "
     "without noise: a bound. Errors are root mean squares in percent of the reference's range; "
-    "a failed case counts as the whole range."
+    "a failed case counts as the whole range. A drawn station rests off the nominal start, where "
+    "the reference begins: much of a slow sine's error is of the first second."
 )
 """What the page says of who is compared."""
 
