@@ -1,5 +1,6 @@
 """The suite `joint`: frozen numbers, an oracle that bounds, runs that go on where they stopped."""
 
+from unittest.mock import Mock
 from zipfile import ZipFile
 
 import numpy as np
@@ -15,15 +16,6 @@ from pma_gym.documents import read_toml
 
 VERSION, DIGEST = 1, "5fd382687c050567"
 """Of the suite's numbers and drawn stations. Who changes one gives it a new version."""
-
-
-class Singular(Feedforward):
-    """A controller whose design fails on every rig."""
-
-    name = "singular"
-
-    def reset(self, info):
-        raise np.linalg.LinAlgError("no solution")
 
 
 @pytest.fixture
@@ -46,53 +38,44 @@ def test_no_number_moves_without_a_new_version():
         frozen_suite("joint")
 
 
-def test_an_oracle_bounds_and_a_second_run_goes_on(slice_of, tmp_path, monkeypatch, capsys):
-    monkeypatch.setitem(RIG_CONTROLLERS, "singular", Singular)
-    everybody = "feedforward", "policy", "oracle", "singular"
+def test_an_oracle_bounds_and_a_stopped_run_goes_on(slice_of, tmp_path, monkeypatch, capsys):
+    reset = Mock(side_effect=np.linalg.LinAlgError("no solution"))
+    monkeypatch.setitem(RIG_CONTROLLERS, "singular", type("Own", (Feedforward,), {"reset": reset}))
+    everybody, journal = ("feedforward", "policy", "oracle", "singular"), tmp_path / "journal.jsonl"
     rows = slice_of(*everybody)
     percent = {row.controller: row.percent for row in rows}
     assert percent["oracle"] < 0.5 * percent["feedforward"] and percent["policy"] < 50.0
     assert percent["singular"] == joint.MISSED and rows[-1].ended_by == "no solution"
     assert len((tmp_path / "scores.csv").read_text().splitlines()) == len(rows) + 1
     assert "| bound | oracle |" in (tmp_path / "report.md").read_text()
-    journal = tmp_path / "journal.jsonl"
-    first, *others = journal.read_text().splitlines(keepends=True)
-    journal.write_text("".join([first[:40] + "\n", *others]))
-    calls, whole = [], joint.score_case
-    monkeypatch.setattr(joint, "score_case", lambda *of: calls.append(of[1]) or whole(*of))
-    again = slice_of(*everybody)
-    assert calls == [["feedforward"]] and "damaged" in capsys.readouterr().err
-    assert [row[:7] for row in again] == [row[:7] for row in rows]
-
-
-def test_ctrl_c_keeps_what_is_done(slice_of, tmp_path, monkeypatch):
-    whole = joint.score_case
-
-    def score(case, names, known):
-        if case.task == "sine_2hz":
-            raise KeyboardInterrupt
-        return whole(case, names, known)
-
-    monkeypatch.setattr(joint, "score_case", score)
+    score, pid = joint.score_case, rows[0]._replace(controller="pid", task="sine_2hz")
+    monkeypatch.setattr(joint, "score_case", Mock(side_effect=[[pid], KeyboardInterrupt]))
     with pytest.raises(KeyboardInterrupt):
-        slice_of("pid", tasks=["sine_1hz", "sine_2hz"])
-    assert len((tmp_path / "journal.jsonl").read_text().splitlines()) == 1
+        slice_of("pid", tasks=["sine_2hz", "steps"])
+    first, *others = journal.read_text().splitlines(keepends=True)
+    assert len(others) == len(rows) and '"pid"' in others[-1]
+    journal.write_text("".join([first[:40] + "\n", *others]))
+    monkeypatch.setattr(joint, "score_case", again := Mock(side_effect=score))
+    assert [row[:7] for row in slice_of(*everybody)] == [row[:7] for row in rows]
+    assert again.call_args.args[1] == ["feedforward"] and "damaged" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
-    ("asked", "message"),
+    ("names", "stations", "tasks", "message"),
     [
-        (((["pda"], None, [])), "the controllers feedforward, pid.*got 'pda'"),
-        ((([], 9, [])), "8 stations of a rig, got --stations 9"),
-        ((([], None, ["sine"])), "tasks sine_0.1hz, .*got --task sine"),
-        (((["brakeless"], 1, ["steps"])), "brakeless apply to no rig"),
+        (["pda"], None, [], "the controllers feedforward, pid.*got 'pda'"),
+        ([], 9, [], "8 stations of a rig, got --stations 9"),
+        ([], None, ["sine"], "tasks sine_0.1hz, .*got --task sine"),
+        (["brakeless"], 1, ["steps"], "brakeless apply to no rig"),
     ],
 )
-def test_a_selection_that_cannot_be_is_refused(asked, message, tmp_path, monkeypatch):
-    brakeless = type("Brakeless", (Feedforward,), {"missing": classmethod(lambda *info: "a brake")})
+def test_a_selection_that_cannot_be_is_refused(
+    names, stations, tasks, message, tmp_path, monkeypatch
+):
+    brakeless = type("Own", (Feedforward,), {"missing": lambda info: "a brake"})
     monkeypatch.setitem(RIG_CONTROLLERS, "brakeless", brakeless)
     with pytest.raises(ValueError, match=message):
-        joint.run_joint(*asked, tmp_path, ThisProcess())
+        joint.run_joint(names, stations, tasks, tmp_path, ThisProcess())
 
 
 def test_what_is_tuned_and_trained_is_shipped_without_the_optimiser(tmp_path, monkeypatch):
