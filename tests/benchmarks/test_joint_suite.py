@@ -22,18 +22,16 @@ VERSION, DIGEST = 1, "5fd382687c050567"
 def slice_of(monkeypatch, tmp_path):
     """Runs controllers on the first station of one rig, in trials of 3 s."""
     document = joint_suite().document
-    short = document["environment"] | {"duration_s": 3.0}
-    rigs = {"muscle_joint": document["rigs"]["muscle_joint"]}
-    small = RigSuite({**document, "environment": short, "rigs": rigs})
-    monkeypatch.setattr(joint, "joint_suite", lambda: small)
+    small = {"environment": document["environment"] | {"duration_s": 3.0}}
+    small |= {"rigs": {"muscle_joint": document["rigs"]["muscle_joint"]}}
+    monkeypatch.setattr(joint, "joint_suite", lambda: RigSuite(document | small))
     return lambda *names, tasks=("steps",): joint.run_joint(
         names, 1, tasks, tmp_path, ThisProcess()
     )
 
 
 def test_no_number_moves_without_a_new_version():
-    suite = joint_suite()
-    assert (suite.document["version"], suite.digest) == (VERSION, DIGEST)
+    assert (joint_suite().document["version"], joint_suite().digest) == (VERSION, DIGEST)
     with pytest.raises(SuiteError, match="run --suite joint"):
         frozen_suite("joint")
 
@@ -93,6 +91,7 @@ def test_what_is_tuned_and_trained_is_shipped_without_the_optimiser(tmp_path, mo
     monkeypatch.setattr(joint, "SETTINGS", tmp_path / "settings.toml")
     (tmp_path / "tuning").mkdir()
     joint.tune_joint(tmp_path)
-    for rig in joint_suite().rigs:
-        assert read_toml(tmp_path / "settings.toml")[rig]["pid"] == RIG_CONTROLLERS["pid"].settings
-        assert ZipFile(joint.policy_file(rig)).namelist() == ["policy.pth"]
+    shipped = read_toml(joint.SETTINGS)
+    assert {shipped[rig]["pid"]["integral"] for rig in joint_suite().rigs} == {2.0}
+    names = [ZipFile(joint.policy_file(rig)).namelist() for rig in joint_suite().rigs]
+    assert names == 3 * [["policy.pth"]]
