@@ -86,22 +86,31 @@ def run(
     seeds: Annotated[int, typer.Option(min=1, help="Episodes of a task of --model.")] = 10,
 ) -> None:
     """Compare controllers on a suite or a rig's model; a stopped run goes on."""
+    of_rigs = [] if controllers == "all" else listed(controllers)
     if model:
         from benchmarks.rigs.run import run_rig
 
-        chosen_ones = [] if controllers == "all" else listed(controllers)
         folder = out or RESULTS / "rigs" / Path(model).stem
-        run_rig(model, listed(task), chosen_ones, environment, seeds, folder)
+        run_rig(model, listed(task), of_rigs, environment, seeds, folder)
         return
     if not suite:
         raise ValueError("run needs --suite NAME, or --model FILE for any rig")
+    from benchmarks.suites.suite import JOINT
+
+    places = executor_named(executor, jobs)
+    if suite == JOINT:
+        from benchmarks.rigs.joint import run_joint
+
+        if traces:
+            raise ValueError(f"suite {JOINT} writes no time series; leave --traces out")
+        run_joint(of_rigs, stations, listed(task), out or RESULTS / JOINT, places)
+        return
     from benchmarks.comparison.job import run_comparison
     from benchmarks.reproduction.reproduce import run_job
     from benchmarks.suites.reproduction import ReproductionSuite
     from pma_gym.data.files.trial_formats import needed
     from pma_gym.terminal import SafeConsole
 
-    places = executor_named(executor, jobs)
     if traces == "parquet":
         needed("pyarrow", "--traces parquet")
     part, entries = _selected(suite, controllers, stations, task)

@@ -91,8 +91,21 @@ def tune(
         str, typer.Option(help="Tasks of any rig, by commas: tune its controllers on these.")
     ] = "",
     environment: EnvironmentOption = "",
+    suite: Annotated[
+        str, typer.Option(help="joint: tune all controllers of rigs for it, and train policies.")
+    ] = "",
 ) -> None:
     """Tune the gains of the PIDs on a model; without --out, the shipped table of gains."""
+    if suite:
+        from benchmarks.rigs.joint import tune_joint
+        from benchmarks.suites.suite import JOINT
+
+        if suite != JOINT:
+            raise ValueError(
+                f"--suite takes {JOINT} alone (see `design` for others), got {suite!r}"
+            )
+        tune_joint(RESULTS / JOINT)
+        return
     if tasks:
         if out or only != "*":
             refuse(ValueError("--tasks keeps settings in results/rigs: leave out --out and --only"))

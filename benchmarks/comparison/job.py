@@ -9,12 +9,14 @@ import difflib
 import json
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from rich.console import Console
 
 from benchmarks.comparison.add import print_scores, write_scores
 from benchmarks.executors.executor import Executor
 from benchmarks.report.leaderboard import keep_bounds, report_command
+from benchmarks.rigs.suite import joint_suite
 from benchmarks.runner.case import cases
 from benchmarks.runner.controller_spec import ControllerError, parse_controllers
 from benchmarks.runner.journal import JOURNAL, rewrite
@@ -86,25 +88,19 @@ def run_comparison(
 
 def print_suites(console: Console) -> None:
     """A table of the suites and of who is compared on them."""
-    frozen = [frozen_suite(name) for name in suite_names()]
-    rows = [
-        [suite.name]
-        + [str(suite.version), str(len(suite.stations)), str(len(suite.episodes))]
-        + [str(len(cases(suite, suite.entries))), str(len(suite.tasks))]
-        for suite in frozen
-    ]
-    header = ("suite", "version", "stations", "episodes", "cases", "tasks")
-    console.print(terminal_table(TextTable("", header, rows)))
-    for suite in frozen:
-        names = ", ".join(entry.spec.name for entry in suite.entries)
-        console.print(f"{suite.name}: {suite.title} ({_control(suite)})", highlight=False)
-        console.print(f"  tasks: {', '.join(suite.tasks)}", highlight=False)
-        console.print(f"  controllers: {names}", highlight=False)
+    documents = suite_documents()
+    header = ("name", "version", "stations", "episodes", "cases")
+    rows = [[*(str(each[name]) for name in header), str(len(each["tasks"]))] for each in documents]
+    console.print(terminal_table(TextTable("", ("suite", *header[1:], "tasks"), rows)))
+    for each in documents:
+        console.print(f"{each['name']}: {each['title']} ({each['loop']})", highlight=False)
+        console.print(f"  tasks: {', '.join(each['tasks'])}", highlight=False)
+        console.print(f"  controllers: {', '.join(each['controllers'])}", highlight=False)
 
 
-def suite_documents() -> list[dict[str, object]]:
-    """The frozen suites for programs: version, size, tasks and controllers."""
-    return [
+def suite_documents() -> list[dict[str, Any]]:
+    """The frozen suites for programs: version, size, tasks, controllers and control loop."""
+    documents = [
         {
             "name": suite.name,
             "version": suite.version,
@@ -115,9 +111,11 @@ def suite_documents() -> list[dict[str, object]]:
             "tasks": list(suite.tasks),
             "controllers": [entry.spec.name for entry in suite.entries],
             "control_rate_hz": suite.control_rate_hz,
+            "loop": _control(suite),
         }
         for suite in map(frozen_suite, suite_names())
     ]
+    return [*documents, joint_suite().summary()]
 
 
 def _control(suite: FrozenSuite) -> str:

@@ -68,6 +68,7 @@ def train(
     on_progress: Callable[[int, int], None] = lambda done, total: None,
     steps: int = STEPS,
     seed: int = 0,
+    reference: Callable[[np.random.Generator], str] | None = None,
 ) -> None:
     """Train a policy, or go on with a training that was interrupted.
 
@@ -78,11 +79,12 @@ def train(
         on_progress: called with the control steps made and their number.
         steps: control steps in all.
         seed: of everything random.
+        reference: draws the name of an episode's task; of any kind if not given.
     """
     progress = file.with_suffix(".json")
     with closing(
         SB3RigVecEnv(
-            ENVIRONMENTS, f"{signal}_steps", reference=AnyReference(signal),
+            ENVIRONMENTS, f"{signal}_steps", reference=reference or AnyReference(signal),
             reward_scale=0.02, **{**options, **SEES},
         )
     ) as envs:  # fmt: skip

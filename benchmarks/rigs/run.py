@@ -10,31 +10,11 @@ from rich.progress import Progress
 from benchmarks.rigs.from_logs import settings_of, write_report
 from benchmarks.rigs.policy import SEES, RigPolicy
 from benchmarks.rigs.score import Score, info_of, scores
+from benchmarks.rigs.suite import varied
 from controllers.rigs import RIG_CONTROLLERS, RigController
 from pma_gym.documents import read_toml
 from pma_gym.envs import RigEnv
-from pma_gym.plant.model import Model, load_model
-
-VARIATION = 0.15
-"""Share by which parameters are drawn either way where a model has no intervals (assumption)."""
-
-
-def varied(model: Model) -> dict[str, list[float]]:
-    """Ranges of what a fit could change: no parts at rest, sensors or rows of numbers."""
-    ranges = {}
-    for name, effect in model.effects.items():
-        if effect.port.startswith("sensor") or name in model.rig.parts and effect.held:
-            continue
-        for key, value in model.values_in_files(name).items():
-            stem = effect.names_in_files()[key]
-            quantity = effect.quantities[stem]
-            if stem not in effect.held and isinstance(value, float) and value > 0.0:
-                ends = sorted((value * (1.0 - VARIATION), value * (1.0 + VARIATION)))
-                ranges[f"{name}.{key}"] = [
-                    max(ends[0], quantity.lower),
-                    min(ends[1], quantity.upper),
-                ]
-    return ranges
+from pma_gym.plant.model import load_model
 
 
 def rig_options(model: str, environment: str) -> dict[str, Any]:

@@ -13,6 +13,7 @@ from benchmarks.runner.controller_spec import ControllerSpec
 from benchmarks.suites.reproduction import GOAL_FIGURES, Goals, ReproductionSuite
 from benchmarks.suites.stations import Recipe, parse_recipe
 from benchmarks.suites.suite import (
+    JOINT,
     NOMINAL,
     SUITES,
     Entry,
@@ -108,6 +109,11 @@ def frozen_suite(source: str) -> FrozenSuite:
     Raises:
         SuiteError: there is none, or its file is not as it should be; names the file and the fix.
     """
+    if source == JOINT:
+        raise SuiteError(
+            f"suite {JOINT} is of other rigs than the station: only `python -m benchmarks run "
+            f"--suite {JOINT}` takes it, and writes its report"
+        )
     path = Path(source) if is_path(source) else SUITES / f"{source}.toml"
     if is_path(source) and missing_file(path):
         raise SuiteError(missing_file(path))

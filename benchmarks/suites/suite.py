@@ -68,6 +68,9 @@ def parse_target(table: Mapping[str, Any]) -> Target:
 
 SUITES = Path(__file__).parent
 
+JOINT = "joint"
+"""Name of the suite of other rigs than the station, see `benchmarks.rigs.suite`."""
+
 
 class SuiteError(ValueError):
     """A suite or a selection that cannot be; the message says what there is."""

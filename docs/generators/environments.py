@@ -4,6 +4,7 @@ import inspect
 from dataclasses import MISSING, fields
 from pathlib import Path
 
+from benchmarks.rigs.suite import joint_suite
 from benchmarks.runner.case import cases
 from benchmarks.suites.frozen import frozen_suite, load_suite, suite_names
 from benchmarks.suites.suite import FrozenSuite
@@ -120,6 +121,9 @@ def suites() -> str:
         suite = frozen_suite(name)
         counts = (len(suite.stations), len(suite.episodes), len(cases(suite, suite.entries)))
         rows.append([code(name), suite.version, suite.title, *counts, _loop(suite)])
+    rigs = joint_suite().summary()
+    counts = [rigs[name] for name in ("stations", "episodes", "cases")]
+    rows.append([code(rigs["name"]), rigs["version"], rigs["title"], *counts, rigs["loop"]])
     return table(
         ["Suite", "Version", "What", "Stations", "Episodes", "Cases", "Loop"],
         rows,

@@ -131,8 +131,8 @@ class RigEnv(RigEpisode, PMAEnv):  # type: ignore[misc]
 
     ## Tasks
     A reference for any signal that a sensor of the model measures: `SIGNAL_steps`, `_ramps`,
-    `_sine`, `_multisine` (`angle_steps`, `contraction_ramps_3` of seed 3), or a Task of
-    `pma_gym.tasks.tracking`. `reference` draws another one at every reset, as in `PMAEnv`.
+    `_sine`, `_multisine` (`angle_steps`, `contraction_ramps_3` of seed 3, `angle_sine_2hz`), or a
+    Task of `pma_gym.tasks.tracking`. `reference` draws another one at every reset, as in `PMAEnv`.
 
     ## Reward, info
     The rewards of `PMAEnv`, of the true error in percent of `span`. The info is in SI:

@@ -106,7 +106,10 @@ def _ramps(span: float, duration: float, seed: int) -> Motion:
 
 
 def _sine(span: float, duration: float, seed: int) -> Motion:
-    frequency = 0.2 + 0.6 * float(motions.shares(seed, 3, 1)[0]) if seed else 0.4
+    return _swing(span, duration, 0.2 + 0.6 * float(motions.shares(seed, 3, 1)[0]) if seed else 0.4)
+
+
+def _swing(span: float, duration: float, frequency: float) -> Motion:
     return motions.Tones(0.5 * span, (0.2 * span,), (frequency,), (0.75,)).ramped(RISE_S, duration)
 
 
@@ -124,6 +127,9 @@ KINDS: dict[str, Callable[[float, float, int], Motion]] = {
 }
 """Motions from 0 on by kind: of a range (SI), a duration (s) and a seed."""
 
+FASTEST_SINE_HZ = 10.0
+"""Fastest sine of a name (Hz): knots of a motion are 1/64 s apart."""
+
 
 def named_tracking(
     name: str,
@@ -134,6 +140,8 @@ def named_tracking(
 ) -> TrackingTask | None:
     """The task of a name such as `angle_steps_3`, of a signal, a kind and a seed; else None.
 
+    `angle_sine_2hz` is a sine of 2 Hz, up to `FASTEST_SINE_HZ`; at 0 Hz it holds.
+
     Args:
         name: the name.
         signals: what the rig measures.
@@ -141,10 +149,15 @@ def named_tracking(
         span: range of the reference (SI); 0 for the usual one of what the signal measures.
         duration: how long (s).
     """
-    match = re.fullmatch(r"(.+)_(steps|ramps|sine|multisine)(?:_(0|[1-9]\d{0,5}))?", name)
+    match = re.fullmatch(
+        r"(.+)_(?:(steps|ramps|sine|multisine)(?:_(0|[1-9]\d{0,5}))?|sine_(\d{1,2}(?:\.\d+)?)hz)",
+        name,
+    )
     if match is None or match[1] not in [signal.name for signal in signals]:
         return None
-    signal, kind, seed = match[1], match[2], int(match[3] or 0)
+    signal, kind, seed, frequency = match[1], match[2], int(match[3] or 0), float(match[4] or 0.0)
+    if frequency > FASTEST_SINE_HZ:
+        return None
     width = span or SPANS[SIGNALS[signal].measures]
-    motion = Shifted(start(signal), KINDS[kind](width, duration, seed))
-    return tracking(signal, motion, width, duration, name)
+    motion = KINDS[kind](width, duration, seed) if kind else _swing(width, duration, frequency)
+    return tracking(signal, Shifted(start(signal), motion), width, duration, name)

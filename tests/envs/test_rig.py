@@ -240,6 +240,17 @@ def _chirp(generator):
     return tracking("angle", lambda time: 0.2 + 0.3 * np.sin(rate * time * time), span=1.2)
 
 
+@pytest.mark.parametrize("frequency", [0.0, 0.1, 2.0])
+def test_a_sine_has_the_frequency_of_its_name(frequency):
+    env = RigEnv(f"angle_sine_{frequency:g}hz", model="muscle_pair", span=1.0)
+    times = np.arange(2.5, 10.0, 0.01)
+    turns = frequency * times + 0.75
+    reference = env.task.schedule.reference(times)
+    assert reference == pytest.approx(0.5 + 0.2 * np.sin(2.0 * np.pi * turns), abs=1e-4)
+    with pytest.raises(ValueError, match=r"angle_sine_2hz \(0 to 10 Hz\).*'angle_sine_11hz'"):
+        RigEnv("angle_sine_11hz", model="muscle_pair")
+
+
 @pytest.mark.parametrize("reference", ["random", ["angle_sine", "angle_ramps_4"], _chirp])
 def test_every_reset_draws_a_reference_by_the_seed(reference):
     options = OPTIONS["joint"] | {"noise": False, "preview": 1, "control_rate_hz": 50.0}

@@ -17,7 +17,7 @@ from pma_gym.plant.plant import Plant
 from pma_gym.plant.statics import Condition
 from pma_gym.tasks import KINDS, Disturbances, Ranges, Task, TrackingTask, as_tracking
 from pma_gym.tasks import named_tracking as named
-from pma_gym.tasks.tracking import SPANS
+from pma_gym.tasks.tracking import FASTEST_SINE_HZ, SPANS
 
 REACHED = 0.9
 """Share of the way to the furthest angle that is the range of a reference (assumption)."""
@@ -190,8 +190,9 @@ def parse_rig_task(given: str | Task | None, options: RigOptions) -> TrackingTas
     if task is None or task.schedule.quantity not in known:
         raise ValueError(
             f"task must be a signal of the rig ({', '.join(known)}) with {', '.join(KINDS)}, such "
-            f"as {known[0]}_steps or {known[0]}_steps_3, or a Task of pma_gym.tasks.tracking for "
-            f"one of these signals, got {given!r}"
+            f"as {known[0]}_steps, {known[0]}_steps_3 or {known[0]}_sine_2hz (0 to "
+            f"{FASTEST_SINE_HZ:g} Hz), or a Task of pma_gym.tasks.tracking for one of these "
+            f"signals, got {given!r}"
         )
     if options.reference is not None:
         several = options.reference if isinstance(options.reference, list) else []
