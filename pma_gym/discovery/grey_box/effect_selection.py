@@ -901,12 +901,9 @@ class EffectSelection:
         return best
 
     def _cost(self, now: Hypothesis, move: Move) -> int:
-        """How long a move's fits take, in those of a parameter by trial."""
-        if move.candidate is None:
-            return 1
-        larger = move.candidate.beside(now.box.model)
-        finer = self.substeps[is_rough(now.box.model)] / self.substeps[is_rough(larger)]
-        return round(finer * (COST if move.start is None else COST**2))
+        """How long a move's fits take, in those of one that needs no shorter steps."""
+        rougher = move.candidate and is_rough(move.candidate.beside(now.box.model))
+        return COST if rougher and not is_rough(now.box.model) else 1
 
     def _keep(self, tried: Sequence[Sequence[Hypothesis]]) -> None:
         """Keep what was fitted last by what was added, the likeliest of each."""
