@@ -239,7 +239,7 @@ class EffectSelection:
         self.gains: dict[str, float] = {}
         self.fitted: dict[frozenset[str], Hypothesis] = {}
         self.noise = [n / self.block**0.5 for n in self.noise]
-        self._rows: dict[tuple[int, bool], list[Rows]] = {}
+        self._rows: dict[tuple[int, bool, bool], list[Rows]] = {}
         self.force = self._force()
 
     def _block(self, readings: Sequence[Sequence[Array]]) -> int:
@@ -260,13 +260,12 @@ class EffectSelection:
         """The filter of a model over the trials, with so many integration steps a row."""
         steps = steps or self.steps
         linear = bool(self.linear if linear is None else linear)
-        if (steps, linear) not in self._rows:
-            each = [
-                Rows(one, self.channels, steps, linear, self.block, self.stride, self.coarse, True)
-                for one in self.logged
-            ]
-            self._rows[steps, linear] = each
-        return GreyBox(model, self._rows[steps, linear], self.channels, self.threads)
+        # Where friction turns nothing is smooth: extrapolation would only make more of it.
+        key = steps, linear, not is_rough(model)
+        if key not in self._rows:
+            how = self.channels, steps, linear, self.block, self.stride, self.coarse, key[2]
+            self._rows[key] = [Rows(each, *how) for each in self.logged]
+        return GreyBox(model, self._rows[key], self.channels, self.threads)
 
     def precise(
         self, model: Model, point: Point, steps: int = 0, linear: bool | None = None
@@ -278,7 +277,7 @@ class EffectSelection:
         rows, steps = self.stride * self.block, steps or self.steps
         point = replace(point, forces=(LEAST_FORCE * self.force,) * len(self.logged))
         total = sum(float(each.time[-1] - each.time[0]) for each in self.logged)
-        most = min(MOST_STEPS * self.span / total, 0.5 * self.span / SHORTEST_S)
+        most = min(MOST_STEPS * self.span / total, self.span / SHORTEST_S)
         box = self.box(model, linear, steps)
         white = self.white(box, [point])
         while 2 * steps <= most:
