@@ -58,7 +58,7 @@ class ForeignLoop:
             return self._readings[max(now - age, 0)]
 
         table, space = self._env.table, self._env.observation_space
-        entries = table.entries(reading, lambda k: self._references[now + k], self._action)
+        entries = table.entries(reading, lambda k: self._references[now + k], [*self._action])
         observation = np.clip(np.array(entries, np.float32), space.low, space.high)  # type: ignore[attr-defined]
         time = now * self._env.options.period
         return RigMeasurement({"angle": reading("", table.delay)}, observation, time)

@@ -174,8 +174,8 @@ def comparison(errors: Mapping[str, Mapping[str, Sequence[float]]]) -> Compariso
     spread = change.std(ddof=1) / len(change) ** 0.5 if len(change) > 1 else 0.0
     expected = {name: float(np.mean(each)) for name, each in errors["predicted"].items()}
     predicted = expected["amended"] / expected["given"] - 1.0
-    means = (float(each) for each in (given.mean(), amended.mean(), change.mean(), spread))
-    return Comparison(*means, predicted)
+    means = float(given.mean()), float(amended.mean()), float(change.mean())
+    return Comparison(*means, float(spread), predicted)
 
 
 def report_blocks(seed: int, records: Sequence[Mapping[str, Any]]) -> list[Block]:
