@@ -228,9 +228,13 @@ def run_foreign_rigs(
 
     Returns:
         Exit code: 0, 1 if a case failed, 130 if interrupted.
+    Raises:
+        ValueError: the folder of the results is a file.
     """
+    if out.exists() and not out.is_dir():
+        raise ValueError(f"--out {out} is a file; name a folder for the results")
     executor, records, failures = local(jobs), list[dict[str, Any]](), list[str]()
-    for controller, number in ((PID, cases), ("policy", policies)):
+    for controller, number in ((PID, cases), ("policy", min(policies, cases))):
         trained = steps if controller == "policy" else 0
         works = [ForeignCase(seed, n, out, controller, seeds, trained) for n in joints(number)]
         with Progress() as progress:
