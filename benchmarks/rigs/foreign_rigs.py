@@ -4,7 +4,7 @@ import json
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from itertools import chain, count, islice
+from itertools import chain, count, islice, product
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -20,6 +20,7 @@ from benchmarks.hidden_effects.rigs.driven_campaign import DrivenCampaign
 from benchmarks.hidden_effects.rigs.laws import HiddenEffect
 from benchmarks.rigs.foreign import foreign_error
 from benchmarks.rigs.from_logs import TUNED, controller_of, environments
+from benchmarks.rigs.run import VARIATION, varied
 from benchmarks.rigs.score import run_episode
 from pma_gym.cli.terminal import print_table
 from pma_gym.data.datasets.dataset import read_dataset
@@ -30,6 +31,13 @@ from pma_gym.plant.model import dump_model
 
 PID = "feedforward_pid"
 """The controller with settings that is compared: a model enters it by its feed-forward too."""
+
+BASELINES = {
+    "given": "given",
+    "varied": f"given, drawn by {100 * VARIATION:.0f} %",
+}
+"""Controllers with which the amended model's is compared, by what they are made on: the model as it
+is, and one whose parameters are drawn about it, as `benchmarks run --model` does."""
 
 LEAST_CHANGE, LEAST_PREDICTED = 0.02, 0.1
 """Shares of the error by which a mean must change to count, and that a model must predict."""
@@ -91,21 +99,21 @@ class ForeignCase:
             kept = json.loads(file.read_text(encoding="utf-8"))
             if kept["asked"] == asked:
                 return kept
-        begun = time.monotonic()
+        start = time.monotonic()
         campaign, effects = drawn(self.seed, self.number)
         assert isinstance(campaign, DrivenCampaign)
         answer = self.diagnosis(campaign, effects)
-        found = json.loads((answer / "diagnosis.json").read_text(encoding="utf-8"))
+        answered = json.loads((answer / "diagnosis.json").read_text(encoding="utf-8"))
         record = {
             "asked": asked,
             "number": self.number,
             "controller": self.controller,
             "simulator": campaign.simulator,
             "hidden": [catalogue_name("joint", each.name) for each in effects],
-            "verdict": found["verdict"],
-            "named": [each["name"] for each in found["effects"]],
+            "verdict": answered["verdict"],
+            "named": [each["name"] for each in answered["effects"]],
             "errors": self.errors(campaign, effects, answer),
-            "seconds": round(time.monotonic() - begun),
+            "seconds": round(time.monotonic() - start),
         }
         write_text(file, json.dumps(record, indent=1, allow_nan=False) + "\n")
         return record
@@ -115,6 +123,9 @@ class ForeignCase:
     ) -> dict[str, dict[str, list[float]]]:
         """Errors (% of the range) by seed, foreign and predicted, by model of the controller."""
         rigs, signal = environments(read_dataset(self.folder / "logs"), None, answer)
+        if self.controller == PID:
+            lab = rigs["given"]
+            rigs["varied"] = {**lab, "randomisation": varied(lab["model"])}
         with Progress(disable=True) as silent:
             made = {
                 name: controller_of(
@@ -138,18 +149,18 @@ class ForeignCase:
 
 
 class Comparison(NamedTuple):
-    """How the amended model's controller compares with the given one's.
+    """How the amended model's controller compares with another.
 
     Attributes:
-        given: mean error (% of the range).
-        amended: the same.
-        change: mean of the paired differences, amended less given.
+        before: mean error of the other one (% of the range).
+        after: the same of the amended model's.
+        change: mean of the paired differences, after less before.
         spread: standard error of that mean.
-        predicted: change as a share of the given one's error, by the amended model.
+        predicted: change as a share of the error before, by the amended model.
     """
 
-    given: float
-    amended: float
+    before: float
+    after: float
     change: float
     spread: float
     predicted: float
@@ -157,7 +168,7 @@ class Comparison(NamedTuple):
     @property
     def outcome(self) -> str:
         """`worse` or `better` where the change is sure and counts; else `same`."""
-        if abs(self.change) <= max(2.0 * self.spread, LEAST_CHANGE * self.given):
+        if abs(self.change) <= max(2.0 * self.spread, LEAST_CHANGE * self.before):
             return "same"
         return "worse" if self.change > 0.0 else "better"
 
@@ -167,23 +178,29 @@ class Comparison(NamedTuple):
         return abs(self.predicted) > LEAST_PREDICTED
 
 
-def comparison(errors: Mapping[str, Mapping[str, Sequence[float]]]) -> Comparison:
-    """Compare paired errors of a record."""
-    given, amended = (np.array(errors["foreign"][name]) for name in ("given", "amended"))
-    change = amended - given
+def comparison(
+    errors: Mapping[str, Mapping[str, Sequence[float]]], baseline: str = "given"
+) -> Comparison:
+    """Compare paired errors of a record with those of a baseline."""
+    before, after = (np.array(errors["foreign"][name]) for name in (baseline, "amended"))
+    change = after - before
     spread = change.std(ddof=1) / len(change) ** 0.5 if len(change) > 1 else 0.0
     expected = {name: float(np.mean(each)) for name, each in errors["predicted"].items()}
-    predicted = expected["amended"] / expected["given"] - 1.0
-    means = float(given.mean()), float(amended.mean()), float(change.mean())
+    predicted = expected["amended"] / expected[baseline] - 1.0
+    means = float(before.mean()), float(after.mean()), float(change.mean())
     return Comparison(*means, float(spread), predicted)
 
 
 def report_blocks(seed: int, records: Sequence[Mapping[str, Any]]) -> list[Block]:
-    """Counts with intervals, and a row a case, for each controller."""
-    blocks: list[Block] = [Heading("Controllers on foreign rigs", 1), Paragraph(f"Seed {seed}.")]
+    """Counts with intervals, and a row a case, for each controller and baseline."""
+    tables: list[Block] = []
     counts: list[list[str]] = []
-    for controller in dict.fromkeys(record["controller"] for record in records):
-        own = [(r, comparison(r["errors"])) for r in records if r["controller"] == controller]
+    for controller, key in product((PID, "policy"), BASELINES):
+        own = [
+            (record, comparison(record["errors"], key))
+            for record in records
+            if record["controller"] == controller and key in record["errors"]["foreign"]
+        ]
         differ = [each for _, each in own if each.differs]
         for label, hits, n in (
             ("not worse", sum(each.outcome != "worse" for _, each in own), len(own)),
@@ -194,17 +211,16 @@ def report_blocks(seed: int, records: Sequence[Mapping[str, Any]]) -> list[Block
                 len(differ),
             ),
         ):
-            low, high = wilson(hits, n)
-            counts.append(
-                [controller, label, f"{hits} of {n}", f"{100 * low:.0f}-{100 * high:.0f} %"]
-            )
-        title = f"{controller}: RMSE in % of the range, made on the given and the amended model"
-        header = ["Case", "Simulator", "Hidden", "Answer", "given", "amended", "change"]
+            ends = " to ".join(f"{100 * end:.0f}" for end in wilson(hits, n))
+            counts += [[controller, BASELINES[key], label, f"{hits} of {n}", f"{ends} %"]] * bool(n)
+        title = f"{controller}: RMSE in % of the range, before on the model {BASELINES[key]}"
+        header = ["Case", "Simulator", "Hidden", "Answer", "before", "amended", "change"]
         rows = [_row(record, each) for record, each in own]
-        blocks.append(TextTable(title, [*header, "predicted change", "outcome"], rows, 4))
-    header = ["Controller", "Amended against given", "Cases", "95 % (Wilson)"]
-    blocks.insert(2, TextTable("All cases", header, counts, 2))
-    return blocks
+        table = TextTable(title, [*header, "predicted change", "outcome"], rows, 4)
+        tables += [table] * bool(rows)
+    header = ["Controller", "Before on the model", "On the amended one", "Cases", "95 % (Wilson)"]
+    summary = TextTable("All cases", header, counts, 3)
+    return [Heading("Controllers on foreign rigs", 1), Paragraph(f"Seed {seed}."), summary, *tables]
 
 
 def _row(record: Mapping[str, Any], each: Comparison) -> list[str]:
@@ -213,8 +229,8 @@ def _row(record: Mapping[str, Any], each: Comparison) -> list[str]:
         record["simulator"],
         ", ".join(record["hidden"]),
         f"{record['verdict']}: {', '.join(record['named'])}".removesuffix(": "),
-        f"{each.given:.3g}",
-        f"{each.amended:.3g}",
+        f"{each.before:.3g}",
+        f"{each.after:.3g}",
         f"{each.change:+.2g} ± {each.spread:.1g}",
         f"{100.0 * each.predicted:+.0f} %",
         each.outcome,

@@ -251,7 +251,7 @@ def test_a_change_counts_where_it_is_sure_and_large(amended, outcome):
 def test_a_case_is_kept_and_one_that_fails_is_said(tmp_path, monkeypatch, capsys):
     """Without a diagnosis: the answer is that the lab's model is right."""
     floors = {"angle_deg": {"value": 0.01, "step": None}}
-    found = {"verdict": "agrees", "effects": [], "parameters": {}, "floors": floors}
+    answer = {"verdict": "agrees", "effects": [], "parameters": {}, "floors": floors}
     numbers, made = foreign_rigs.joints(32), from_logs.logged_options
     turns = [turn_of(number) for number in numbers]
     assert {(rig, "effect" in kind) for rig, kind, _ in turns} == {("joint", True)}
@@ -264,7 +264,7 @@ def test_a_case_is_kept_and_one_that_fails_is_said(tmp_path, monkeypatch, capsys
             foreign_rigs,
             "diagnose",
             lambda logs: SimpleNamespace(
-                model=load_model(logs.model), text=lambda: json.dumps(found)
+                model=load_model(logs.model), text=lambda: json.dumps(answer)
             ),
         ),
     ):
@@ -274,8 +274,8 @@ def test_a_case_is_kept_and_one_that_fails_is_said(tmp_path, monkeypatch, capsys
     assert foreign_rigs.run_foreign_rigs(2, 0, 2, 31, 1, tmp_path, 1) == 1
     assert "case 1: ZeroDivisionError" in capsys.readouterr().out
     report = (tmp_path / "report.md").read_text()
-    assert "| feedforward_pid | not worse | 1 of 1 |" in report
+    assert "| feedforward_pid | given | not worse | 1 of 1 | 21 to 100 % |" in report
     assert "| 29 | MuJoCo | joint_directional_damping | agrees |" in report
     # On the same model, under the same noise, both are the same to the last bit.
     assert "| +0 ± 0 | +0 % | same |" in report
-    assert len((tmp_path / "scores.csv").read_text().splitlines()) == 1 + 2 * 2 * 2
+    assert len((tmp_path / "scores.csv").read_text().splitlines()) == 1 + 3 * 2 * 2
