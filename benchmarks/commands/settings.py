@@ -1,4 +1,4 @@
-"""The commands about settings and the simulator: `tune`, `design`, `remake` and `speed`."""
+"""The commands about settings and the simulator; `remake` is for maintainers alone."""
 
 import sys
 from pathlib import Path
@@ -39,7 +39,7 @@ def speed(
     raise typer.Exit(run_speed(json_file, check, only, quick))
 
 
-@app.command(epilog="Example: python -m benchmarks remake --list")
+@app.command(hidden=True, epilog="Example: python -m benchmarks remake --list")
 def remake(
     only: Annotated[str, typer.Option(help="Steps by commas, see --list; else all.")] = "",
     without: Annotated[str, typer.Option(help="Steps that are left out, by commas.")] = "",

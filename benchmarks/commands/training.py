@@ -1,4 +1,4 @@
-"""The commands about policies: `train` and `export`."""
+"""The commands from logs and about policies: `from-logs`, `foreign-rigs`, `train`, `export`."""
 
 from dataclasses import replace
 from enum import StrEnum
@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from benchmarks.commands.options import app
+from benchmarks.commands.options import Jobs, app
 from benchmarks.files import RESULTS
 
 
@@ -39,6 +39,26 @@ def from_logs(
     with Progress() as progress:
         run_from_logs(logs, model, answer, folder, progress, steps)
     print(f"Report: {folder / 'report.html'}")
+
+
+@app.command(
+    "foreign-rigs", epilog="Example: python -m benchmarks foreign-rigs --cases 4 --seed 31"
+)
+def foreign_rigs(
+    cases: Annotated[int, typer.Option(min=1, help="Rigs; more extend the set.")] = 32,
+    policies: Annotated[int, typer.Option(min=0, help="Of these rigs so many get policies.")] = 8,
+    seeds: Annotated[int, typer.Option(min=2, help="References and noises of a rig.")] = 20,
+    seed: Annotated[int, typer.Option(min=0, help="Same seed, same rigs.")] = 0,
+    steps: Annotated[
+        int, typer.Option(min=1, help="Control steps that each policy is trained for.")
+    ] = 1_000_000,
+    out: Annotated[Path, typer.Option(help="Folder of the results.")] = RESULTS / "foreign-rigs",
+    jobs: Jobs = 2,
+) -> None:
+    """Score controllers made from foreign rigs' logs on these rigs; a stopped run goes on."""
+    from benchmarks.rigs.foreign_rigs import run_foreign_rigs
+
+    raise typer.Exit(run_foreign_rigs(cases, policies, seeds, seed, steps, out, jobs))
 
 
 @app.command(epilog="Example: python -m benchmarks train --algo ppo --task displacement --seed 1")

@@ -33,6 +33,8 @@ BANDWIDTH_HZ = 1000.0
 
 CONTROLLERS = ("feedforward", "pid", "feedforward_pid", "lqg")
 SEEDS = range(5)
+TUNED = ("steps", "ramps", "multisine")
+"""Kinds of references that settings are searched with, and controllers scored on."""
 
 
 def amended(folder: Path) -> tuple[Model, OneOf]:
@@ -105,6 +107,28 @@ def logged_options(dataset: Dataset, model: Model) -> dict[str, Any]:
     raise ValueError("the logs measure none of the rig's signals")
 
 
+def environments(
+    dataset: Dataset, initial_model: str | None, diagnosis: Path
+) -> tuple[dict[str, dict[str, Any]], str]:
+    """Options of the environments of the amended and the given model, and the signal to follow.
+
+    Args:
+        dataset: the logs.
+        initial_model: name or file of the model as it was given; that of the data set if None.
+        diagnosis: folder of the diagnosis.
+    """
+    better, uncertainty = amended(diagnosis)
+    document = json.loads((diagnosis / "diagnosis.json").read_text(encoding="utf-8"))
+    start = with_noise(load_model(initial_model or dataset.model or better), document["floors"])
+    options = logged_options(dataset, better)
+    signal = options.pop("signal")
+    drawn = uncertainty if uncertainty.paths else "none"
+    return {
+        "amended": {**options, "model": better, "randomisation": drawn},
+        "given": {**options, "model": start},
+    }, signal
+
+
 def run_from_logs(
     logs: Path,
     initial_model: str | None,
@@ -126,42 +150,53 @@ def run_from_logs(
         steps: control steps of a policy's training.
     """
     dataset = read_dataset(logs)
-    better, uncertainty = amended(diagnosis)
-    start = load_model(initial_model or dataset.model or better)
-    document = json.loads((diagnosis / "diagnosis.json").read_text(encoding="utf-8"))
-    models = {"amended": better, "given": with_noise(start, document["floors"])}
-    options = logged_options(dataset, better)
-    signal = options.pop("signal")
-    tasks = [f"{signal}_{kind}" for kind in ("steps", "ramps", "multisine")]
+    rigs, signal = environments(dataset, initial_model, diagnosis)
+    tasks = [f"{signal}_{kind}" for kind in TUNED]
     made: dict[str, tuple[RigController, Mapping[str, Any], Model]] = {}
-    rigs = {
-        "amended": {**options, "model": better, "randomisation": uncertainty},
-        "given": {**options, "model": models["given"]},
-    }
-    for name, model in models.items():
-        write_text(out / f"{name}.toml", dump_model(model))
-        for controller in CONTROLLERS:
-            settings = settings_of(
-                out, f"{controller}-{name}", controller, rigs[name], tasks, progress
-            )
-            made[f"{controller} ({name})"] = RIG_CONTROLLERS[controller](settings), {}, model
-        file, bar = out / f"policy-{name}.zip", progress.add_task(f"policy, {name}", total=steps)
-        train(
-            rigs[name],
-            signal,
-            file,
-            lambda done, _, bar=bar: progress.update(bar, completed=done),
-            steps,
-        )
-        made[f"policy ({name})"] = RigPolicy(file, rigs[name]), SEES, model
+    for name, options in rigs.items():
+        write_text(out / f"{name}.toml", dump_model(options["model"]))
+        for controller in (*CONTROLLERS, "policy"):
+            one = controller_of(out, controller, name, options, signal, progress, steps)
+            made[f"{controller} ({name})"] = *one, options["model"]
     rows = [
         row
         for rig, own in rigs.items()
         for controller, (which, sees, model) in made.items()
         for row in scores(rig, own, {controller: (which, sees)}, tasks, SEEDS, model)
     ]
-    write_report(out, f"Controllers of {dataset.title or logs.name}", rows, document["sentence"])
+    sentence = json.loads((diagnosis / "diagnosis.json").read_text(encoding="utf-8"))["sentence"]
+    write_report(out, f"Controllers of {dataset.title or logs.name}", rows, sentence)
     return rows
+
+
+def controller_of(
+    out: Path,
+    controller: str,
+    model: str,
+    options: Mapping[str, Any],
+    signal: str,
+    progress: Progress,
+    steps: int,
+) -> tuple[RigController, Mapping[str, Any]]:
+    """A controller made for an environment, and options that it needs beside that one's.
+
+    Args:
+        out: folder that keeps settings and policies.
+        controller: its name, or `policy`.
+        model: name of the environment's model in names of files.
+        options: of the environment.
+        signal: what is to follow.
+        progress: shows how far it is.
+        steps: control steps of a policy's training.
+    """
+    if controller != "policy":
+        tasks = [f"{signal}_{kind}" for kind in TUNED]
+        key = f"{controller}-{model}"
+        settings = settings_of(out, key, controller, options, tasks, progress)
+        return RIG_CONTROLLERS[controller](settings), {}
+    file, bar = out / f"policy-{model}.zip", progress.add_task(f"policy, {model}", total=steps)
+    train(options, signal, file, lambda done, _: progress.update(bar, completed=done), steps)
+    return RigPolicy(file, options), SEES
 
 
 def settings_of(

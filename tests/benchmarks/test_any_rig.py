@@ -2,18 +2,32 @@
 
 import json
 import sys
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from benchmarks.rigs import from_logs, run, tune
+from benchmarks.hidden_effects.rigs.drawing import turn_of
+from benchmarks.hidden_effects.rigs.driven_campaign import DrivenCampaign
+from benchmarks.hidden_effects.rigs.rig import Rig
+from benchmarks.hidden_effects.rigs.sensing import Noise, Sensor
+from benchmarks.rigs import foreign_rigs, from_logs, run, tune
+from benchmarks.rigs.foreign import foreign_error
 from benchmarks.rigs.score import run_episode, scores
-from controllers.rigs import RIG_CONTROLLERS, Feedforward, RigLQG, RigMPC, RigPID
+from controllers.rigs import (
+    RIG_CONTROLLERS,
+    Feedforward,
+    FeedforwardPID,
+    RigController,
+    RigLQG,
+    RigMPC,
+    RigPID,
+)
 from controllers.rigs.rig_controller import Lever
 from pma_gym import Plant, Trial
 from pma_gym.data.files.trial_files import write_trial
 from pma_gym.envs import RigEnv
-from pma_gym.plant.model import dump_model, parse_model
+from pma_gym.plant.model import dump_model, load_model, parse_model
 from tests.envs.test_rig import SLIDE
 
 HEAD = {"schema": 1, "name": "arm", "title": "a rig of a test"}
@@ -274,3 +288,85 @@ def test_controllers_are_compared_under_the_same_noise():
     made = {"a": (Feedforward({}), {}), "b": (RIG_CONTROLLERS["feedforward"]({}), {})}
     rows = scores("arm", options, made, ["angle_ramps"], range(2))
     assert [row.percent for row in rows[:2]] == [row.percent for row in rows[2:]]
+
+
+ARM = Rig("joint", 0.0049, 0.02, 0.0, 0.2, 0.0, travel=1.0, frequency=1.0, rate=1000.0)
+"""The numbers of the model of `RIGS["joint"]`."""
+
+
+class Seeing(RigController):
+    """Acts on what it sees, as a policy does: the error and the last angles."""
+
+    def reset(self, info):
+        self.seen = []
+
+    def act(self, measurement):
+        self.seen.append(measurement.observation)
+        angle, _, error = measurement.observation[:3]
+        return [0.4 * error - 0.8 * (angle - measurement.observation[-2])]
+
+
+@pytest.mark.parametrize("simulator", ["own", "MuJoCo"])
+@pytest.mark.parametrize("kind", [Seeing, RigPID, FeedforwardPID])
+def test_a_foreign_rig_that_hides_nothing_scores_as_its_environment(kind, simulator):
+    sensor = Sensor("encoder", 1e-5, Noise(0.0))
+    rig = DrivenCampaign(ARM, ARM, sensor, (), {}, 0.0, simulator, (1,))
+    options = {**RIGS["joint"][0], "duration_s": 2.0, "control_rate_hz": 50.0, "noise": False}
+    env, controller = RigEnv("angle_steps_3", preview=2, history=2, **options), kind(kind.settings)
+    info, *_ = run_episode(env, controller, 0)
+    seen = getattr(controller, "seen", np.zeros(1))
+    assert foreign_error(rig, (), env, controller, 0) == pytest.approx(
+        info["percent_of_range"], rel=0.01
+    )
+    # A command arrives within a row of the simulation, 1 ms.
+    assert np.allclose(seen, getattr(controller, "seen", np.zeros(1)), atol=0.01)
+
+
+@pytest.mark.parametrize(
+    ("amended", "outcome"),
+    [
+        ([1.0, 2.1, 2.9], "same"),
+        ([1.03, 2.03, 3.03], "same"),
+        ([1.1, 2.1, 3.1], "worse"),
+        ([0.5, 1.4, 2.6], "better"),
+        ([0.1, 2.5, 2.9], "same"),
+    ],
+)
+def test_a_change_counts_where_it_is_sure_and_large(amended, outcome):
+    errors = {"given": [1.0, 2.0, 3.0], "amended": amended}
+    predicted = {"given": [2.0], "amended": [1.7]}
+    made = foreign_rigs.comparison({"foreign": errors, "predicted": predicted})
+    assert made.outcome == outcome and made.differs and made.predicted == pytest.approx(-0.15)
+
+
+def test_a_case_is_kept_and_one_that_fails_is_said(tmp_path, monkeypatch, capsys):
+    """Without a diagnosis: the answer is that the lab's model is right."""
+    floors = {"angle_deg": {"value": 0.01, "step": None}}
+    answer = {"verdict": "agrees", "effects": [], "parameters": {}, "floors": floors}
+    numbers, made = foreign_rigs.joints(32), from_logs.logged_options
+    turns = [turn_of(number) for number in numbers]
+    assert {(rig, "effect" in kind) for rig, kind, _ in turns} == {("joint", True)}
+    assert [simulator for *_, simulator in turns] == ["own", "MuJoCo"] * 16
+    for owner, name, quick in (
+        (tune, "EVALUATIONS", 4),
+        (from_logs, "logged_options", lambda *given: made(*given) | {"duration_s": 1.0}),
+        (foreign_rigs, "joints", lambda cases: [29, 1][:cases]),
+        (
+            foreign_rigs,
+            "diagnose",
+            lambda logs: SimpleNamespace(
+                model=load_model(logs.model), text=lambda: json.dumps(answer)
+            ),
+        ),
+    ):
+        monkeypatch.setattr(owner, name, quick)
+    assert foreign_rigs.run_foreign_rigs(1, 0, 2, 31, 1, tmp_path, 1) == 0
+    monkeypatch.setattr(foreign_rigs, "drawn", lambda seed, number: 1 / 0)
+    assert foreign_rigs.run_foreign_rigs(2, 0, 2, 31, 1, tmp_path, 1) == 1
+    assert "case 1: ZeroDivisionError" in capsys.readouterr().out
+    report = (tmp_path / "report.md").read_text()
+    assert "| feedforward_pid | given | not worse | 1 of 1 | 21 to 100 % |" in report
+    assert "| 29 | MuJoCo | joint_directional_damping | agrees |" in report
+    # On the same model, under the same noise, both are the same to the last bit.
+    assert "| +0 ± 0 | +0 % | same |" in report
+    assert len((tmp_path / "scores.csv").read_text().splitlines()) == 1 + 3 * 2 * 2

@@ -208,16 +208,21 @@ DRAWN = {"slide": draw_driven, "joint": draw_driven, "imposed": draw_tested}
 """How campaigns of each kind of rig are drawn."""
 
 
-def draw(seed: int, number: int) -> tuple[dict[str, str], dict[str, Any]]:
-    """Files of a case by name, and its truth; the same seed and number give the same bits."""
+def drawn(seed: int, number: int) -> tuple[Campaign, list[HiddenEffect]]:
+    """Rig of a case, and what it hides; the same seed and number give the same bits."""
     rng = np.random.default_rng((seed, number, 0x51D5))
     rig, kind, simulator = turn_of(number)
     campaign: Campaign = DRAWN[rig](rng, rig, simulator, (seed, number))
     effects = _hidden(rng, kind, campaign)
-    campaign = campaign.within_range(effects)
+    return campaign.within_range(effects), effects
+
+
+def draw(seed: int, number: int) -> tuple[dict[str, str], dict[str, Any]]:
+    """Files of a case by name, and its truth."""
+    campaign, effects = drawn(seed, number)
     truth = {
         "block": "rigs",
-        "kind": kind,
+        "kind": turn_of(number)[1],
         "effects": [_described(campaign, each) for each in effects],
         "base_factors": {},
         "seed": seed,

@@ -133,27 +133,43 @@ class DrivenCampaign:
         self, effects: Sequence[HiddenEffect], i: int, seconds: float = math.inf
     ) -> tuple[Motion, np.ndarray]:
         """True motion and the sensor's readings (m, rad) of file i, or of its first seconds."""
-        rig, reference = self.rig, self.references[i]
-        rows = int(min(len(reference.q), seconds * rig.rate))
+        reference = self.references[i]
+        rows = int(min(len(reference.q), seconds * self.rig.rate))
         sensing = self.sensor, self.noise(i)
         rests = self._rests(effects)
         controller = Controller(self.believed, reference, *sensing, self.bandwidth, rests)
-        transmission = Transmission()
-        for each in effects:
-            transmission = each.transmission(transmission)
-        start = (float(reference.q[0]), 0.0)
-        moved = rig, tuple(effects), transmission, controller, rows, start
-        if self.simulator == "MuJoCo":
-            step = self._mujoco_step()
-            if math.isinf(seconds) and any(
-                each.kinetic(0.0, 0.0, rig.peak_force) for each in effects
-            ):
-                step = mujoco_axis.dry_step(step, rows / rig.rate)
-            motion = mujoco_axis.simulate(*moved, step)
-        else:
-            motion = stick_slip.simulate(*moved)
+        start = float(reference.q[0])
+        motion = self.motion(effects, controller, rows, start, math.isinf(seconds))
         controller.read(float(motion.q[-1]))
         return motion, np.array(controller.readings)
+
+    def motion(
+        self,
+        effects: Sequence[HiddenEffect],
+        source: stick_slip.Source,
+        rows: int,
+        start: float = 0.0,
+        fine: bool = False,
+    ) -> Motion:
+        """The true motion under a source of commands, from rest.
+
+        Args:
+            effects: what the rig hides.
+            source: of the commands.
+            rows: of the log.
+            start: position (m, rad).
+            fine: steps of MuJoCo are short where dry friction is hidden.
+        """
+        rig, transmission = self.rig, Transmission()
+        for each in effects:
+            transmission = each.transmission(transmission)
+        moved = rig, tuple(effects), transmission, source, rows, (start, 0.0)
+        if self.simulator != "MuJoCo":
+            return stick_slip.simulate(*moved)
+        step = self._mujoco_step()
+        if fine and any(each.kinetic(0.0, 0.0, rig.peak_force) for each in effects):
+            step = mujoco_axis.dry_step(step, rows / rig.rate)
+        return mujoco_axis.simulate(*moved, step)
 
     def ratio(self, effect: HiddenEffect) -> float:
         """Size r of an effect, by the beginning of the first file."""
