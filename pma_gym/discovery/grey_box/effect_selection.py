@@ -10,6 +10,7 @@ from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
 from pma_gym.discovery.fitting.free_parameters import free_parameters, prior
 from pma_gym.discovery.grey_box.kept_fits import fit
 from pma_gym.discovery.grey_box.thresholds import (
+    CONFIDENCE,
     FAINT,
     LIKE,
     LINE,
@@ -31,6 +32,7 @@ from pma_gym.estimation.innovations import (
     value_in_trial,
 )
 from pma_gym.estimation.likelihood_fit import (
+    BLOCKS,
     STEP,
     Coordinate,
     Fit,
@@ -880,11 +882,10 @@ class EffectSelection:
                 best = chain[:1]
             if self._lead(chain, best) < LIKE:
                 break
-            least = self._worth(chain) - LIKE
             near = [
                 other[-1]
                 for other in tried[1:]
-                if other[:-1] == tried[0][:-1] and self._worth(other) > least
+                if other[:-1] == tried[0][:-1] and self._is_rival(other, chain)
             ]
             alike = {each.moves[-1].name: each for each in reversed(near)}
             names = tuple(dict.fromkeys(each.moves[-1].name for each in near))
@@ -915,6 +916,28 @@ class EffectSelection:
 
     def _lead(self, chain: Sequence[Hypothesis], other: Sequence[Hypothesis]) -> float:
         return self._worth(chain) - self._worth(other)
+
+    def _is_rival(self, other: Sequence[Hypothesis], best: Sequence[Hypothesis]) -> bool:
+        """Whether other readings of the same rigs might well be likelier by another chain.
+
+        The lead is within its own scatter over blocks of readings: where no model is quite right,
+        a lead of many units may be chance (Q. H. Vuong 1989, "Likelihood ratio tests for model
+        selection and non-nested hypotheses", Econometrica 57).
+        """
+        lead = self._lead(best, other)
+        if lead < LIKE:
+            return True
+        differ = self._densities(best[-1]) - self._densities(other[-1])
+        edges = np.linspace(0, len(differ), BLOCKS + 1).astype(int)[:-1]
+        scatter = BLOCKS**0.5 * float(np.std(np.add.reduceat(differ, edges)))
+        return lead < CONFIDENCE * scatter
+
+    @staticmethod
+    def _densities(each: Hypothesis) -> Array:
+        """Log likelihood of each reading, less a constant."""
+        results = zip(each.box.innovations([each.fit.point]), each.box.rows, strict=True)
+        rows = [(e[0] ** 2 / s[0] + np.log(s[0]))[trial.there] for (e, s), trial in results]
+        return -0.5 * np.concatenate(rows)
 
     def _extended(self, beam: Sequence[list[Hypothesis]], step: str) -> list[list[Hypothesis]]:
         """Every chain with each of its most promising moves, the likeliest for its price first."""
