@@ -30,7 +30,7 @@ class ForeignLoop:
     def __init__(
         self, env: RigEnv, controller: RigController, sensor: Sensor, noise: np.ndarray
     ) -> None:
-        if [signal.name for signal in env.options.signals] != ["angle"]:
+        if [signal.is_angle for signal in env.options.signals] != [True]:
             raise ValueError("a foreign joint has a sensor of its angle alone, as the logs tell")
         self._env, self._controller, self._sensor, self._noise = env, controller, sensor, noise
         self.rows = round(RATE_HZ * env.options.period)

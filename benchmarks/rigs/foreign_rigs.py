@@ -20,8 +20,8 @@ from benchmarks.hidden_effects.rigs.driven_campaign import DrivenCampaign
 from benchmarks.hidden_effects.rigs.laws import HiddenEffect
 from benchmarks.rigs.foreign import foreign_error
 from benchmarks.rigs.from_logs import TUNED, controller_of, environments
-from benchmarks.rigs.run import VARIATION, varied
 from benchmarks.rigs.score import run_episode
+from benchmarks.rigs.suite import VARIATION, varied
 from pma_gym.cli.terminal import print_table
 from pma_gym.data.datasets.dataset import read_dataset
 from pma_gym.discovery import diagnose

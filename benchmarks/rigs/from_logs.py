@@ -122,9 +122,8 @@ def environments(
     start = with_noise(load_model(initial_model or dataset.model or better), document["floors"])
     options = logged_options(dataset, better)
     signal = options.pop("signal")
-    drawn = uncertainty if uncertainty.paths else "none"
     return {
-        "amended": {**options, "model": better, "randomisation": drawn},
+        "amended": {**options, "model": better, "randomisation": uncertainty},
         "given": {**options, "model": start},
     }, signal
 

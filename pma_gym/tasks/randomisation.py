@@ -165,7 +165,7 @@ class Uncertainty:
 
     def __call__(self, model: Model, generator: np.random.Generator) -> Model:
         """The model with drawn values."""
-        model = model.replace(self.values)
+        model = model.replace(self.values) if self.values else model
         known = {p: v for e in model.effects for k, v in model.values_in_files(e).items()
                  if (p := f"{e}.{k}") in self.paths}  # fmt: skip
         middle = [known[path] for path in self.paths]

@@ -117,7 +117,8 @@ class Task:
         name = self.name.replace("_", " ")
         if self.name in TASKS:
             return f"Isokinetic {name}"
-        contracts = self.schedule.followed.shortens and "contraction" not in name
+        followed = self.schedule.followed
+        contracts = followed.shortens and followed.name not in name
         return name.capitalize() + (" contraction" if contracts else "")
 
     @property

@@ -97,7 +97,7 @@ def weak(name, command, most):
         (weak("slide", "load_command", 1.0), "contraction_steps", 0.95),
         (RIGS["station"][0], "contraction_steps", 0.9),
         ({"model": "muscle_joint"}, "angle_steps", 0.99),
-        ({"model": "muscle_pair"}, "angle_steps", 0.9),
+        ({"model": "muscle_pair", "span": 1.5}, "angle_steps", 0.9),
         ({"model": "valve_pair"}, "angle_steps", 0.9),
     ],
 )
@@ -343,6 +343,10 @@ def test_a_case_is_kept_and_one_that_fails_is_said(tmp_path, monkeypatch, capsys
     """Without a diagnosis: the answer is that the lab's model is right."""
     floors = {"angle_deg": {"value": 0.01, "step": None}}
     answer = {"verdict": "agrees", "effects": [], "parameters": {}, "floors": floors}
+    answer |= {
+        "covariance": {n: [] for n in ("parameters", "deviations", "correlation")},
+        "rivals": [],
+    }
     numbers, made = foreign_rigs.joints(32), from_logs.logged_options
     turns = [turn_of(number) for number in numbers]
     assert {(rig, "effect" in kind) for rig, kind, _ in turns} == {("joint", True)}

@@ -103,7 +103,7 @@ def test_at_most_ten_comparisons_name_a_signal(compared):
         for path, line, name in compared
         if path.name != "signals.py" and name in names - {""}
     ]
-    assert len(there) <= 10, there
+    assert len(there) <= 10, "\n".join(there)
 
 
 def test_an_unknown_rig_is_refused_with_those_there_are():

@@ -10,7 +10,7 @@ from pma_gym.data.trial_columns import BY_QUANTITY, Column
 from pma_gym.discovery.grey_box.thresholds import CONFIDENCE, LEFT
 from pma_gym.discovery.report.figure_text import capitalised, percent, signal_name
 from pma_gym.discovery.result.misfit import LatentForce, ResidualLaw
-from pma_gym.estimation.innovations import PORTS
+from pma_gym.estimation.innovations import PORTS, SPEEDS
 from pma_gym.estimation.smoother import Smoothed
 from pma_gym.plant.model import Model
 from pma_gym.plant.rigs.rig import Rig
@@ -141,9 +141,10 @@ def latent_line(trials: Sequence[Smoothed]) -> tuple[float, float] | None:
 
 def drafted_effect(law: ResidualLaw, rig: Rig) -> str:
     """A Python file with a law as a user effect, whose share is fitted."""
-    of = {_label(column): column for column in (BY_QUANTITY[s.name] for s in rig.signals[:2])}
-    column = of[law.variable]
-    signal = "spin" if column.quantity == "speed" else column.quantity
+    states = (rig.signals[0].name, SPEEDS[rig.name])
+    columns = [BY_QUANTITY[each.name] for each in rig.signals[:2]]
+    of = {_label(column): (column, state) for column, state in zip(columns, states, strict=True)}
+    column, signal = of[law.variable]
     title = f"{capitalised(law.quantity)} over {law.variable}"
     at = tuple(float(f"{x * SI_FACTORS[column.unit]:.6g}") for x in law.at)
     values = tuple(float(f"{y:.6g}") for y in law.law)

@@ -35,6 +35,10 @@ HALF_RAIL, PAD, LEAST_PART = 150.0, 0.15, 0.2
 and the least share of the task's range that counts for it."""
 
 
+TURNED = ("rotation", "contraction")
+"""Signals of what `RigDrawing` draws: a muscle that turns a motor's shaft."""
+
+
 class RigPicture(Picture):
     """Draw pictures of an environment of any rig; see `Picture`.
 
@@ -62,7 +66,7 @@ class RigPicture(Picture):
         super().__init__(task, width)
 
     def _drawing(self, axes: Axes, task: Task) -> Any:  # noqa: ANN401
-        if "rotation" in self._options.nominal.rig.outputs:
+        if set(TURNED) <= set(self._options.nominal.rig.outputs):
             return RigDrawing(axes, task)
         return PartDrawing(axes, task, self._options, self._ends)
 
@@ -101,7 +105,7 @@ class PartDrawing:
         self._ended = axes.text(185.0, -235.0, "", size=9, color=BROKEN, weight="bold", ha="right")
         self.moving: list[Artist] = [self._numbers, self._ended, self._mark]
         self._muscles: list[tuple[float, Any, Any, Polygon, Any]] = []
-        if self._position.measures == "angle":
+        if self._position.is_angle:
             self._make_arm()
         else:
             axes.add_patch(Rectangle((-HALF_RAIL, -8.0), 2.0 * HALF_RAIL, 8.0, fc=FAINT, ec=STEEL))
@@ -112,7 +116,7 @@ class PartDrawing:
         """Move all parts to where a scene has them."""
         position = scene.truth[self._position.name]
         reference = scene.position - scene.error
-        if self._position.measures == "angle":
+        if self._position.is_angle:
             self._move_arm(position)
             ray = np.array([1.06, 1.22]) * ARM
             mark = math.sin(reference) * ray, -math.cos(reference) * ray

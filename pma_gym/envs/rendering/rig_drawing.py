@@ -157,7 +157,7 @@ class RigDrawing:
             outwards = -1.0 if self._task.schedule.followed.shortens else 1.0
             x = end - 1e3 * outwards * scene.error + 0.5 * SLIDE_WIDTH
             self._mark.set_data([x, x], [-64.0, -45.0])
-        elif self._task.exercise or self._task.schedule.quantity == "rotation":
+        elif self._task.exercise or self._task.schedule.followed.is_angle:
             excess = self._task.schedule.followed.is_force
             reference = PACE.at(scene.time) if excess else scene.truth["rotation"] - scene.error
             radii = np.array([1.08, 1.38]) * np.exp(1j * (math.pi / 2 - reference))
