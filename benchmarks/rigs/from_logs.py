@@ -13,6 +13,7 @@ from rich.progress import Progress
 from benchmarks.files import csv_text, write_text
 from benchmarks.rigs.policy import SEES, STEPS, RigPolicy, train
 from benchmarks.rigs.score import Score, score_table, scores
+from benchmarks.rigs.suite import varied
 from benchmarks.rigs.tune import tuned
 from controllers.rigs import RIG_CONTROLLERS, RigController
 from pma_gym.cli.terminal import print_table
@@ -23,7 +24,7 @@ from pma_gym.document_shape import ListOf, check_shape, shape_of
 from pma_gym.pages.document import Block, Heading, Paragraph, to_html
 from pma_gym.plant.model import Model, dump_model, load_model
 from pma_gym.plant.sensors import direct_command
-from pma_gym.tasks import OneOf, Uncertainty
+from pma_gym.tasks import OneOf, Ranges, Uncertainty
 
 RATE_HZ = 50.0
 """Control rate."""
@@ -112,6 +113,9 @@ def environments(
 ) -> tuple[dict[str, dict[str, Any]], str]:
     """Options of the environments of the amended and the given model, and the signal to follow.
 
+    Where something unknown is missing, the amended model's parameters are drawn as those of a model
+    without a fit.
+
     Args:
         dataset: the logs.
         initial_model: name or file of the model as it was given; that of the data set if None.
@@ -122,8 +126,10 @@ def environments(
     start = with_noise(load_model(initial_model or dataset.model or better), document["floors"])
     options = logged_options(dataset, better)
     signal = options.pop("signal")
+    # A fit's covariance says nothing of what no effect carries.
+    drawn = Ranges(varied(better)) if document["verdict"] == "unknown" else uncertainty
     return {
-        "amended": {**options, "model": better, "randomisation": uncertainty},
+        "amended": {**options, "model": better, "randomisation": drawn},
         "given": {**options, "model": start},
     }, signal
 
