@@ -152,6 +152,7 @@ def lab(tmp_path):
             "deviations": [0.01, 1e-4],
             "correlation": [[1.0, 0.9], [0.9, 1.0]],
         },
+        "verdict": "effect",
         "rivals": [],
         "floors": {"angle_deg": {"value": 0.02, "step": None}},
     }

@@ -28,7 +28,6 @@ from pma_gym.discovery.grey_box.thresholds import (
     LIKE,
     MATERIAL,
     NOISES,
-    ROWS_LATE,
     SMALL,
     SURE,
 )
@@ -207,8 +206,8 @@ class Conclusions:
         late, error = last.fit.point.delay, last.fit.deviations["delay"]
         row = self.selection.span / self.selection.stride / self.selection.block
         # How an incomplete model's commands run between rows is not known to less than a row.
-        rows = ROWS_LATE if self.misfit(last) < COMPLETE else 1.0
-        if late < max(rows * row, CONFIDENCE * error):
+        unknown = 0.0 if self.misfit(last) < COMPLETE else row
+        if late < max(unknown, SURE * error):
             return 0.0
         price = np.log(len(self.candidates)) + self.selection.price_of(last, 1)
         return max(0.0, last.fit.value - self._prompt - float(price))

@@ -43,12 +43,6 @@ ODD = 3.0
 FAINT = 0.002
 """Share of the drive's force below which only promising candidates are fitted."""
 
-ROWS_LATE = 0.25
-"""Rows of the log below which a delay is a matter of how commands are written between rows.
-
-A held command is a line half a row later, so half of that tells neither from the other.
-"""
-
 NOISES = 3.0
 """Noises that predictions may miss by where the model is said to be right.
 
