@@ -880,6 +880,8 @@ class EffectSelection:
             chain = [*before, self._again(now, last), last]
             if len(chain) == 2:
                 best = chain[:1]
+            if self._lead(chain[:-1], best) > 0.0:
+                best = chain[:-1]
             if self._lead(chain, best) < LIKE:
                 break
             near = [
