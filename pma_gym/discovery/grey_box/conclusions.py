@@ -15,9 +15,19 @@ from pma_gym.data.trial_columns import BY_QUANTITY
 from pma_gym.discovery.answer.trial_records import gaps
 from pma_gym.discovery.diagnosis import Verdict
 from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
-from pma_gym.discovery.grey_box.effect_selection import EffectSelection, Hypothesis, Move, slot
+from pma_gym.discovery.grey_box.effect_selection import EffectSelection
+from pma_gym.discovery.grey_box.first_fit import hold_fits
+from pma_gym.discovery.grey_box.hypothesis import Hypothesis, Move
 from pma_gym.discovery.grey_box.kept_fits import fit
 from pma_gym.discovery.grey_box.latent_law import latent_force, latent_law, latent_line
+from pma_gym.discovery.grey_box.prepared_trials import LEAST_FORCE
+from pma_gym.discovery.grey_box.slots import (
+    gains_of_drive,
+    path_of,
+    quantity_of,
+    slot,
+    with_numbers,
+)
 from pma_gym.discovery.grey_box.thresholds import (
     COMPLETE,
     CONFIDENCE,
@@ -39,7 +49,7 @@ from pma_gym.estimation.innovations import TREND, TRIAL, GreyBox, counted, predi
 from pma_gym.estimation.likelihood_fit import value_of, with_tied, with_values
 from pma_gym.estimation.smoother import Smoothed, smoothed
 from pma_gym.plant.model import Model
-from pma_gym.units import SI_FACTORS, Quantity
+from pma_gym.units import SI_FACTORS
 
 Array = NDArray[np.float64]
 
@@ -68,7 +78,7 @@ class Conclusions:
     @cached_property
     def horizon(self) -> float:
         """How far ahead is predicted (s)."""
-        shortest = min(float(each.time[-1] - each.time[0]) for each in self.selection.logged)
+        shortest = min(float(each.time[-1] - each.time[0]) for each in self.selection.trials.logged)
         return min(HORIZON_S, HORIZON * shortest)
 
     @cached_property
@@ -77,7 +87,7 @@ class Conclusions:
         chosen = self._chosen
         prompt = [c for c in chosen.fit.coordinates if c.name != "delay"]
         made = fit(chosen.box, replace(chosen.fit.point, delay=0.0), prompt, chosen.fit.tied)
-        least = chosen.fit.value - self.selection.price_of(chosen, 1) - LIKE
+        least = chosen.fit.value - chosen.price_of(1) - LIKE
         return replace(chosen, fit=made) if made.value > least else chosen
 
     @cached_property
@@ -143,7 +153,7 @@ class Conclusions:
     def misfit(self, each: Hypothesis) -> float:
         """Root mean square of what predictions miss, in noises."""
         parts = [
-            ((curve - trial.readings[:, :, 0]) / self.selection.noise)[trial.measured]
+            ((curve - trial.readings[:, :, 0]) / self.selection.trials.noise)[trial.measured]
             for curve, trial in zip(self.curves(each), each.box.rows, strict=True)
         ]
         return _rms(np.concatenate(parts))
@@ -162,7 +172,9 @@ class Conclusions:
     def is_worse(self) -> bool:
         """Whether the model as it came predicts better than the proposed one."""
         pairs = zip(self.given, self.last.box.rows, strict=True)
-        off = [((c - t.readings[:, :, 0]) / self.selection.noise)[t.measured] for c, t in pairs]
+        off = [
+            ((c - t.readings[:, :, 0]) / self.selection.trials.noise)[t.measured] for c, t in pairs
+        ]
         return _rms(np.concatenate(off)) < self.misfit(self.last)
 
     def share(self, each: Hypothesis) -> float:
@@ -176,7 +188,8 @@ class Conclusions:
         ratio = each.fit.point.memory / self.horizon
         mean = 2.0 * ratio * (1.0 - ratio * (1.0 - np.exp(-1.0 / ratio)))
         return (
-            float(np.sqrt(np.mean(np.square(each.fit.point.forces)) * mean)) / self.selection.force
+            float(np.sqrt(np.mean(np.square(each.fit.point.forces)) * mean))
+            / self.selection.trials.force
         )
 
     @cached_property
@@ -192,7 +205,9 @@ class Conclusions:
         """Whether a latent force is worth its price beside the proposed hypothesis."""
         last = self.last
         without = [c for c in last.fit.coordinates if not c.name.startswith("force ")]
-        none = replace(last.fit.point, forces=(1e-6 * self.selection.force,) * len(self.named))
+        none = replace(
+            last.fit.point, forces=(LEAST_FORCE * self.selection.trials.force,) * len(self.named)
+        )
         made = fit(last.box, none, without, last.fit.tied)
         return (
             last.fit.value - made.value > self.selection.price(last, replace(last, fit=made)) + LIKE
@@ -205,12 +220,14 @@ class Conclusions:
         if not self.candidates or not any(c.name == "delay" for c in last.fit.coordinates):
             return 0.0
         late, error = last.fit.point.delay, last.fit.deviations["delay"]
-        row = self.selection.span / self.selection.stride / self.selection.block
+        row = (
+            self.selection.trials.span / self.selection.trials.stride / self.selection.trials.block
+        )
         # How an incomplete model's commands run between rows is not known to less than a row.
         rows = ROWS_LATE if self.misfit(last) < COMPLETE else 1.0
         if late < max(rows * row, CONFIDENCE * error):
             return 0.0
-        price = np.log(len(self.candidates)) + self.selection.price_of(last, 1)
+        price = np.log(len(self.candidates)) + last.price_of(1)
         return max(0.0, last.fit.value - self._prompt - float(price))
 
     @property
@@ -220,7 +237,9 @@ class Conclusions:
         prompt = tuple(c for c in last.fit.coordinates if c.name != "delay")
         start = replace(last.fit, point=replace(last.fit.point, delay=0.0), coordinates=prompt)
         for linear in (False, True):
-            made = self.selection.hold_fits(start, last.box.model, linear, last.box.rows[0].steps)
+            made = hold_fits(
+                self.selection.trials, start, last.box.model, linear, last.box.rows[0].steps
+            )
             values += [each.value for each in made]
         return max(values)
 
@@ -258,7 +277,10 @@ class Conclusions:
         What was fitted beside such a value stands in for something else, or the value is wrong.
         """
         own = self.path[0].box.numbers()
-        names = [".".join(self.selection.model.rig.inertia), *self.selection.gains_of_drive()]
+        names = [
+            ".".join(self.selection.trials.model.rig.inertia),
+            *gains_of_drive(self.selection.trials.model),
+        ]
         free = {c.name for c in self.last.fit.coordinates}
         ratios = {n: value_of(self.last.fit.point, n) / own[n] for n in names if n in free}
         return {n: ratio for n, ratio in ratios.items() if not 1.0 / FAR < ratio < FAR}
@@ -308,9 +330,9 @@ class Conclusions:
         """Curves and gaps of every trial."""
         last, base = self.last, self.path[0]
         records = []
-        signals = self.selection.model.rig.signals
+        signals = self.selection.trials.model.rig.signals
         ended = self._ended if last.moves else [None] * len(self.named)
-        forces = map(partial(latent_force, self.selection.model), self.smooth, ended)
+        forces = map(partial(latent_force, self.selection.trials.model), self.smooth, ended)
         curves = zip(
             self.named,
             last.box.rows,
@@ -364,7 +386,7 @@ class Conclusions:
     def model(self) -> Model:
         """The amended model."""
         if self.verdict == "agrees" or self.is_worse or self.far:
-            return self.selection.model
+            return self.selection.trials.model
         last = self.path[0] if self.verdict == "unknown" else self.last
         model = last.box.model
         if self.delayed and self.verdict == "effect":
@@ -441,7 +463,7 @@ class Conclusions:
         A lag, and with one signal that of its sensor.
         """
         channels = self.last.box.channels
-        sensors = [self.selection.model.rig.signals[channel].sensor for channel in channels]
+        sensors = [self.selection.trials.model.rig.signals[channel].sensor for channel in channels]
         late = [f"{sensor}_{kind}" for sensor in sensors for kind in ("delay", "lag")]
         names = [each.name for each in self.candidates]
         return tuple(n for n in names if n == "drive_lag" or len(channels) == 1 and n in late)
@@ -473,8 +495,8 @@ class Conclusions:
     def law(self) -> ResidualLaw | None:
         """What the latent force goes with."""
         base = self.path[0]
-        rows = max(1.0, 2.0 * base.fit.point.memory / self.selection.span)
-        return latent_law(self.smooth, self.selection.model.rig, rows)
+        rows = max(1.0, 2.0 * base.fit.point.memory / self.selection.trials.span)
+        return latent_law(self.smooth, self.selection.trials.model.rig, rows)
 
     @cached_property
     def line(self) -> tuple[float, float] | None:
@@ -485,13 +507,13 @@ class Conclusions:
     def states(self) -> dict[str, TrialState]:
         """What belongs to each trial: its start, and its own values."""
         out = {}
-        position, speed = self.selection.model.rig.start_paths.items()
+        position, speed = self.selection.trials.model.rig.start_paths.items()
         for i, (each, smooth) in enumerate(zip(self.named, self._ended, strict=True)):
             values = {}
             for (_, path), value in zip(
                 (position, speed), (smooth.position[0], smooth.speed[0]), strict=True
             ):
-                values[path] = float(value) / SI_FACTORS[_unit(path)]
+                values[path] = float(value) / SI_FACTORS[quantity_of(slot(path)).unit]
             for move in self.last.moves:
                 for name in move.slots:
                     base, _, number = (
@@ -511,41 +533,6 @@ class Conclusions:
     @cached_property
     def _ended(self) -> list[Smoothed]:
         return [smoothed(self.last.box, self.last.fit.point, i) for i in range(len(self.named))]
-
-
-def with_numbers(model: Model, numbers: Mapping[str, float]) -> Model:
-    """A model with fitted numbers (SI) by slot; those of one trial alone are none of it."""
-    changes = {}
-    for name, value in numbers.items():
-        effect, _, stem = name.partition(".")
-        if stem in model.effects[effect].rows or TREND in stem or TRIAL in stem or "[" in stem:
-            continue
-        if value != getattr(model.parameters[effect], stem):
-            quantity = CATALOGUE[effect].quantities[stem]
-            # A bound in SI and back may be a bit beyond itself.
-            changes[path_of(name)] = float(
-                np.clip(quantity.from_si(value), quantity.lower, quantity.upper)
-            )
-    return model.replace(changes)
-
-
-def path_of(name: str) -> str:
-    """Path of a slot: with its file unit."""
-    effect, _, stem = name.partition(".")
-    keys = {own: key for key, own in CATALOGUE[effect].names_in_files().items()}
-    return f"{effect}.{keys[stem]}"
-
-
-def quantity_of(name: str) -> Quantity:
-    """Unit and bounds of a slot's parameter."""
-    effect, _, stem = name.partition(".")
-    return CATALOGUE[effect].quantities[stem]
-
-
-def _unit(path: str) -> str:
-    effect, _, key = path.partition(".")
-    law = CATALOGUE[effect]
-    return law.quantities[law.names_in_files()[key]].unit
 
 
 def _rms(off: Array) -> float:

@@ -1,7 +1,8 @@
 """The verdict of a free rig as a person would say it."""
 
-from pma_gym.discovery.grey_box.conclusions import Conclusions, path_of, quantity_of
+from pma_gym.discovery.grey_box.conclusions import Conclusions
 from pma_gym.discovery.grey_box.latent_law import FORCES, largest_share
+from pma_gym.discovery.grey_box.slots import path_of, quantity_of
 from pma_gym.discovery.grey_box.thresholds import MATERIAL
 from pma_gym.discovery.report.effect_text import effect_names
 from pma_gym.discovery.report.figure_text import (
@@ -41,7 +42,7 @@ def sentence(conclusions: Conclusions) -> str:
         best = f" Best candidate: {names}, which leaves {percent(conclusions.left)} of it."
         number, share = largest_share(conclusions.smooth)
         words += f" {percent(share)} of it acts in {conclusions.named[number].name}."
-        rig, best = conclusions.selection.model.plant, best if conclusions.effects else ""
+        rig, best = conclusions.selection.trials.model.plant, best if conclusions.effects else ""
         return (
             f"Something that no effect of the catalogue carries acts on the {rig}: {left}."
             f"{words}{best}"
@@ -94,9 +95,9 @@ def _misses(conclusions: Conclusions) -> str:
 
 def _left(conclusions: Conclusions) -> str:
     """The latent force that is left."""
-    what, unit = FORCES[conclusions.selection.model.plant]
+    what, unit = FORCES[conclusions.selection.trials.model.plant]
     share = conclusions.share(conclusions.last)
-    size = figure(share * conclusions.selection.force)
+    size = figure(share * conclusions.selection.trials.force)
     return f"a latent {what.split()[0]} of {size} {unit}, {percent(share)} of the drive's"
 
 
