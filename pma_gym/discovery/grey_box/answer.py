@@ -16,7 +16,9 @@ from pma_gym.discovery.grey_box.first_fit import first_fit
 from pma_gym.discovery.grey_box.kept_fits import kept_in
 from pma_gym.discovery.grey_box.latent_law import drafted_effect
 from pma_gym.discovery.grey_box.next_trial import next_trial
+from pma_gym.discovery.grey_box.predictions import Predictions
 from pma_gym.discovery.grey_box.prepared_trials import PreparedTrials
+from pma_gym.discovery.grey_box.proposal import Proposal
 from pma_gym.discovery.grey_box.sentence import sentence
 from pma_gym.discovery.grey_box.slots import path_of, quantity_of, with_numbers
 from pma_gym.discovery.grey_box.thresholds import MATERIAL
@@ -34,7 +36,7 @@ from pma_gym.units import SI_FACTORS
 def diagnosis(conclusions: Conclusions, propose: bool) -> Diagnosis:
     """The answer with its conclusions, and the next experiment where one is to be proposed."""
     following, none_helps = next_trial(conclusions) if propose else (None, "")
-    base, last = conclusions.path[0], conclusions.last
+    base, last = conclusions.predictions.path[0], conclusions.proposal.last
     named = conclusions.verdict == "effect"
     floors = {}
     for i, channel in enumerate(base.box.channels):
@@ -47,7 +49,7 @@ def diagnosis(conclusions: Conclusions, propose: bool) -> Diagnosis:
             )
         )
         floors[column.name] = Floor(value, "innovations", {"innovations": value}, step, ())
-    approximate = conclusions.share(last) > MATERIAL and bool(conclusions.effects)
+    approximate = conclusions.proposal.share(last) > MATERIAL and bool(conclusions.effects)
     return Diagnosis(
         verdict=conclusions.verdict,
         sentence=sentence(conclusions),
@@ -65,7 +67,9 @@ def diagnosis(conclusions: Conclusions, propose: bool) -> Diagnosis:
             conclusions.selection.trials.model,
         ),
         rivals=rival_models(conclusions),
-        approximate=Approximate(conclusions.effects, conclusions.left, conclusions.holds_out(last))
+        approximate=Approximate(
+            conclusions.effects, conclusions.proposal.left, conclusions.predictions.holds_out(last)
+        )
         if approximate
         else None,
         law=conclusions.law if conclusions.verdict == "unknown" or approximate else None,
@@ -79,13 +83,13 @@ def diagnosis(conclusions: Conclusions, propose: bool) -> Diagnosis:
         states=conclusions.states,
         trials=conclusions.records,
         steps=_steps(conclusions),
-        warnings=(*([WORSE] if conclusions.is_worse else []), *filter(None, [none_helps])),
+        warnings=(*([WORSE] if conclusions.proposal.is_worse else []), *filter(None, [none_helps])),
     )
 
 
 def rival_models(conclusions: Conclusions) -> tuple[RivalModel, ...]:
     """Models with another effect in the place of the last one, which were worth as much."""
-    last, written = conclusions.last, conclusions.model
+    last, written = conclusions.proposal.last, conclusions.model
     move = last.moves[-1].candidate if last.moves else None
     if conclusions.verdict != "effect" or move is None or move.effect not in written.parameters:
         return ()
@@ -190,5 +194,7 @@ def answered(
     with kept_in(journal):
         path = [first_fit(trials, seed, tell)] if candidates is None else selection.run()
         tell("putting the answer together", 0, 1)
-        conclusions = Conclusions(selection, path, named, limits, candidates or ())
+        predictions = Predictions(trials, path, tell)
+        proposal = Proposal(selection, predictions, candidates or ())
+        conclusions = Conclusions(selection, predictions, proposal, named, limits)
         return diagnosis(conclusions, propose)

@@ -93,7 +93,8 @@ def next_trial(conclusions: Conclusions) -> tuple[NextExperiment | None, str]:
 
 def _rivals(conclusions: Conclusions) -> tuple[list[Hypothesis], list[str]]:
     """Hypotheses that these logs do not tell apart, and the effects in question."""
-    selection, last, base = conclusions.selection, conclusions.last, conclusions.path[0]
+    selection, last = conclusions.selection, conclusions.proposal.last
+    base = conclusions.predictions.path[0]
     for at, (move, names) in enumerate(zip(last.moves, last.rivals, strict=False)):
         others, alike = [each.name for each in last.moves if each is not move], []
         for name in [n for n in names if TREND not in n and TRIAL not in n][:MOST_RIVALS]:
