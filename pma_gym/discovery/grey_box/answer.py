@@ -10,15 +10,18 @@ from pma_gym.discovery.answer.estimates import rival_model
 from pma_gym.discovery.diagnosis import Diagnosis
 from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
 from pma_gym.discovery.fitting.journal import Journal
-from pma_gym.discovery.grey_box.conclusions import Conclusions, path_of, quantity_of, with_numbers
+from pma_gym.discovery.grey_box.conclusions import Conclusions
 from pma_gym.discovery.grey_box.effect_selection import EffectSelection
+from pma_gym.discovery.grey_box.first_fit import first_fit
 from pma_gym.discovery.grey_box.kept_fits import kept_in
 from pma_gym.discovery.grey_box.latent_law import drafted_effect
 from pma_gym.discovery.grey_box.next_trial import next_trial
+from pma_gym.discovery.grey_box.predictions import Predictions
+from pma_gym.discovery.grey_box.prepared_trials import PreparedTrials
+from pma_gym.discovery.grey_box.proposal import Proposal
 from pma_gym.discovery.grey_box.sentence import sentence
-from pma_gym.discovery.grey_box.thresholds import (
-    MATERIAL,
-)
+from pma_gym.discovery.grey_box.slots import path_of, quantity_of, with_numbers
+from pma_gym.discovery.grey_box.thresholds import MATERIAL
 from pma_gym.discovery.report.effect_text import effect_name
 from pma_gym.discovery.report.figure_text import figure, listed
 from pma_gym.discovery.result.estimates import Approximate, Covariance, RivalModel
@@ -33,17 +36,20 @@ from pma_gym.units import SI_FACTORS
 def diagnosis(conclusions: Conclusions, propose: bool) -> Diagnosis:
     """The answer with its conclusions, and the next experiment where one is to be proposed."""
     following, none_helps = next_trial(conclusions) if propose else (None, "")
-    base, last = conclusions.path[0], conclusions.last
+    base, last = conclusions.predictions.path[0], conclusions.proposal.last
     named = conclusions.verdict == "effect"
     floors = {}
     for i, channel in enumerate(base.box.channels):
-        column = BY_QUANTITY[conclusions.selection.model.rig.signals[channel].name]
+        column = BY_QUANTITY[conclusions.selection.trials.model.rig.signals[channel].name]
         value, step = (
             v / SI_FACTORS[column.unit]
-            for v in (base.fit.point.deviations[i], conclusions.selection.steps_of_readings[i])
+            for v in (
+                base.fit.point.deviations[i],
+                conclusions.selection.trials.steps_of_readings[i],
+            )
         )
         floors[column.name] = Floor(value, "innovations", {"innovations": value}, step, ())
-    approximate = conclusions.share(last) > MATERIAL and bool(conclusions.effects)
+    approximate = conclusions.proposal.share(last) > MATERIAL and bool(conclusions.effects)
     return Diagnosis(
         verdict=conclusions.verdict,
         sentence=sentence(conclusions),
@@ -54,34 +60,36 @@ def diagnosis(conclusions: Conclusions, propose: bool) -> Diagnosis:
         candidates=(),
         next_experiment=following,
         model=conclusions.model,
-        given=conclusions.selection.model,
+        given=conclusions.selection.trials.model,
         covariance=covariance_of(
             (base if conclusions.verdict == "unknown" else last).fit,
             conclusions.model,
-            conclusions.selection.model,
+            conclusions.selection.trials.model,
         ),
         rivals=rival_models(conclusions),
-        approximate=Approximate(conclusions.effects, conclusions.left, conclusions.holds_out(last))
+        approximate=Approximate(
+            conclusions.effects, conclusions.proposal.left, conclusions.predictions.holds_out(last)
+        )
         if approximate
         else None,
         law=conclusions.law if conclusions.verdict == "unknown" or approximate else None,
-        draft=drafted_effect(conclusions.law, conclusions.selection.model.rig)
+        draft=drafted_effect(conclusions.law, conclusions.selection.trials.model.rig)
         if conclusions.verdict == "unknown" and conclusions.law
         else "",
-        tones={conclusions.selection.model.plant: conclusions.line[0]}
+        tones={conclusions.selection.trials.model.plant: conclusions.line[0]}
         if conclusions.verdict == "unknown" and conclusions.line
         else {},
         floors=floors,
         states=conclusions.states,
         trials=conclusions.records,
         steps=_steps(conclusions),
-        warnings=(*([WORSE] if conclusions.is_worse else []), *filter(None, [none_helps])),
+        warnings=(*([WORSE] if conclusions.proposal.is_worse else []), *filter(None, [none_helps])),
     )
 
 
 def rival_models(conclusions: Conclusions) -> tuple[RivalModel, ...]:
     """Models with another effect in the place of the last one, which were worth as much."""
-    last, written = conclusions.last, conclusions.model
+    last, written = conclusions.proposal.last, conclusions.model
     move = last.moves[-1].candidate if last.moves else None
     if conclusions.verdict != "effect" or move is None or move.effect not in written.parameters:
         return ()
@@ -90,7 +98,7 @@ def rival_models(conclusions: Conclusions) -> tuple[RivalModel, ...]:
         rival = each.moves[-1].candidate
         if rival is not None:
             fitted = with_numbers(each.box.model, each.fit.point.numbers)
-            known = covariance_of(each.fit, fitted, conclusions.selection.model)
+            known = covariance_of(each.fit, fitted, conclusions.selection.trials.model)
             models.append(rival_model([rival], [move], written, fitted, known))
     return tuple(model for model in models if model is not None)
 
@@ -177,15 +185,16 @@ def answered(
         TrialError: trials with fewer readings than a fit needs.
     """
     logged = [Logged.of(model, i, each.trial) for i, each in enumerate(named)]
-    selection = EffectSelection(
-        model, logged, candidates or (), seed=seed, tell=tell, threads=threads
-    )
+    trials = PreparedTrials(model, logged, threads)
+    selection = EffectSelection(trials, candidates or (), seed, tell)
     limits = {
         BY_QUANTITY[name].name: value / SI_FACTORS[BY_QUANTITY[name].unit]
         for name, value in tolerance.items()
     }
     with kept_in(journal):
-        path = [selection.base()] if candidates is None else selection.run()
+        path = [first_fit(trials, seed, tell)] if candidates is None else selection.run()
         tell("putting the answer together", 0, 1)
-        conclusions = Conclusions(selection, path, named, limits, candidates or ())
+        predictions = Predictions(trials, path, tell)
+        proposal = Proposal(selection, predictions, candidates or ())
+        conclusions = Conclusions(selection, predictions, proposal, named, limits)
         return diagnosis(conclusions, propose)

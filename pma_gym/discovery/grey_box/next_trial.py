@@ -24,7 +24,9 @@ from pma_gym.discovery.experiments.excitation import Excitation
 from pma_gym.discovery.experiments.next_experiment import ENOUGH, LEAST, ExpectedOdds
 from pma_gym.discovery.experiments.predicted_trials import proposal
 from pma_gym.discovery.grey_box.conclusions import Conclusions
-from pma_gym.discovery.grey_box.effect_selection import EffectSelection, Hypothesis
+from pma_gym.discovery.grey_box.effect_fits import tried
+from pma_gym.discovery.grey_box.hypothesis import Hypothesis
+from pma_gym.discovery.grey_box.prepared_trials import PreparedTrials
 from pma_gym.discovery.grey_box.thresholds import LIKE
 from pma_gym.discovery.report.effect_text import effect_names
 from pma_gym.discovery.report.figure_text import figure, signal_name
@@ -73,7 +75,7 @@ def next_trial(conclusions: Conclusions) -> tuple[NextExperiment | None, str]:
         return None, ""
     selection, best = conclusions.selection, None
     selection.tell("choosing the next experiment", 0, 1)
-    question = Question(conclusions.selection, rivals)
+    question = Question(selection.trials, rivals)
     expected = [question.expected(*each) for each in _commands(conclusions)]
     for reach in REACHES:
         within = [odds for far, odds in expected if far <= reach]
@@ -91,14 +93,15 @@ def next_trial(conclusions: Conclusions) -> tuple[NextExperiment | None, str]:
 
 def _rivals(conclusions: Conclusions) -> tuple[list[Hypothesis], list[str]]:
     """Hypotheses that these logs do not tell apart, and the effects in question."""
-    selection, last, base = conclusions.selection, conclusions.last, conclusions.path[0]
+    selection, last = conclusions.selection, conclusions.proposal.last
+    base = conclusions.predictions.path[0]
     for at, (move, names) in enumerate(zip(last.moves, last.rivals, strict=False)):
         others, alike = [each.name for each in last.moves if each is not move], []
         for name in [n for n in names if TREND not in n and TRIAL not in n][:MOST_RIVALS]:
             if (made := selection.fitted.get(frozenset((*others, name)))) is None:
                 made = selection.fitted.get(frozenset((*others[:at], name)))
                 for later in last.moves[at + 1 :]:
-                    made = made and selection.tried(made, later)
+                    made = made and tried(selection.trials, made, later)
             alike += [(name, made)] if made else []
         if move.candidate and alike:
             return [last, *(made for _, made in alike)], [move.name, *(name for name, _ in alike)]
@@ -113,7 +116,7 @@ def _rivals(conclusions: Conclusions) -> tuple[list[Hypothesis], list[str]]:
 def _commands(conclusions: Conclusions) -> Iterator[tuple[str, Trial]]:
     """Commands from rest within the range of the logs, with their names."""
     selection, named = conclusions.selection, conclusions.named
-    direct = direct_command(selection.model) or "motor_voltage"
+    direct = direct_command(selection.trials.model) or "motor_voltage"
     name = direct if direct in named[0].trial.commands else "load_command"
     trials = [each.trial for each in named if name in each.trial.commands]
     unit, title = BY_QUANTITY[name].unit, name.replace("_", " ")
@@ -121,7 +124,7 @@ def _commands(conclusions: Conclusions) -> Iterator[tuple[str, Trial]]:
     rest = float(np.median([each.commands[name][0] for each in trials]))
     low, high = float(values.min()), float(values.max())
     usual = min(LONGEST_S, float(np.median([each.duration for each in trials])))
-    step = selection.span
+    step = selection.trials.span
     for size in SIZES:
         ends = [rest + size * (end - rest) for end in (low, high)]
         said = [figure(end / SI_FACTORS[unit]) for end in ends]
@@ -149,32 +152,32 @@ class Question:
     """Which of some rivals is right.
 
     Attributes:
-        selection: of effects, with the trials so far.
+        trials: so far.
         rivals: the likeliest first.
     """
 
-    selection: EffectSelection
+    trials: PreparedTrials
     rivals: Sequence[Hypothesis]
 
     @cached_property
     def seen(self) -> tuple[float, float, float]:
         """Least, greatest and usual first reading of the first signal in the trials so far."""
-        channel = self.selection.channels[0]
-        rows = [each.measured[channel][each.counts[channel] > 0] for each in self.selection.logged]
+        channel = self.trials.channels[0]
+        rows = [each.measured[channel][each.counts[channel] > 0] for each in self.trials.logged]
         joined = np.concatenate(rows)
         return float(joined.min()), float(joined.max()), float(np.median([row[0] for row in rows]))
 
     def expected(self, name: str, trial: Trial) -> tuple[float, ExpectedOdds]:
         """How far a trial may go, in travels of the trials so far, and the log odds to expect."""
         low, high, start = self.seen
-        signals, first = self.selection.model.rig.signals, self.selection.channels[0]
+        signals, first = self.trials.model.rig.signals, self.trials.channels[0]
         still = {s.name: np.full(len(trial.time), 0.0) for s in signals}
         still[signals[first].name] += start
-        logged = Logged.of(self.selection.model, 0, replace(trial, measurements=still))
+        logged = Logged.of(self.trials.model, 0, replace(trial, measurements=still))
         runs, predicted = [], []
         for rival in self.rivals:
-            options = rival.box.rows[0].steps, bool(self.selection.linear), 1
-            rows = Rows(logged, self.selection.channels, *options)
+            options = rival.box.rows[0].steps, self.trials.linear, 1
+            rows = Rows(logged, self.trials.channels, *options)
             box = GreyBox(rival.box.model, [rows], rival.box.channels, rival.box.threads)
             unread = counted(rows, np.zeros(len(rows.time), bool))
             ((errors, _),) = box.innovations([_alone(rival.fit.point)], [unread])

@@ -1,7 +1,9 @@
 """The verdict of a free rig as a person would say it."""
 
-from pma_gym.discovery.grey_box.conclusions import Conclusions, path_of, quantity_of
+from pma_gym.discovery.grey_box.conclusions import Conclusions
 from pma_gym.discovery.grey_box.latent_law import FORCES, largest_share
+from pma_gym.discovery.grey_box.sizes import estimate
+from pma_gym.discovery.grey_box.slots import path_of, quantity_of
 from pma_gym.discovery.grey_box.thresholds import MATERIAL
 from pma_gym.discovery.report.effect_text import effect_names
 from pma_gym.discovery.report.figure_text import (
@@ -28,7 +30,7 @@ def sentence(conclusions: Conclusions) -> str:
     own, left = listed(by_trial(conclusions)), _left(conclusions)
     if conclusions.verdict == "effect":
         rest = f"; {own}" if own else ""
-        is_rough = conclusions.share(conclusions.last) > MATERIAL
+        is_rough = conclusions.proposal.share(conclusions.proposal.last) > MATERIAL
         approximate = f"; the law is approximate: {left}, is left" if is_rough else ""
         named = sized_effects(conclusions.effects)
         return f"{named} missing{rest}: {_misses(conclusions)}{approximate}."
@@ -38,15 +40,15 @@ def sentence(conclusions: Conclusions) -> str:
             hertz, of = conclusions.line
             words += f" It oscillates at {figure(hertz)} Hz: {percent(of)} of its variance."
         names = effect_names([each.name for each in conclusions.effects])
-        best = f" Best candidate: {names}, which leaves {percent(conclusions.left)} of it."
+        best = f" Best candidate: {names}, which leaves {percent(conclusions.proposal.left)} of it."
         number, share = largest_share(conclusions.smooth)
         words += f" {percent(share)} of it acts in {conclusions.named[number].name}."
-        rig, best = conclusions.selection.model.plant, best if conclusions.effects else ""
+        rig, best = conclusions.selection.trials.model.plant, best if conclusions.effects else ""
         return (
             f"Something that no effect of the catalogue carries acts on the {rig}: {left}."
             f"{words}{best}"
         )
-    if conclusions.verdict == "undecidable" and conclusions.far:
+    if conclusions.verdict == "undecidable" and conclusions.proposal.far:
         return _far(conclusions)
     if conclusions.verdict == "undecidable":
         return f"Too little is left to name: {left}, but {_misses(conclusions)}. {WHAT_TO_CHECK}"
@@ -67,7 +69,7 @@ def sentence(conclusions: Conclusions) -> str:
 def _far(conclusions: Conclusions) -> str:
     """What the fit does to a parameter that the model should have nearly right."""
     moved = []
-    for name in conclusions.far:
+    for name in conclusions.proposal.far:
         now = conclusions.parameters[path_of(name)]
         moved.append(f"{path_of(name)} {estimate_text(now.now)} instead of {figure(now.start)}")
     names = effect_names([each.name for each in conclusions.effects])
@@ -84,7 +86,7 @@ def _misses(conclusions: Conclusions) -> str:
     """What predictions miss by."""
     (signal, gap), *_ = conclusions.gap.items()
     seen = " of trials that it was not fitted to" if gap.held_out else ""
-    ahead = f"{figure(conclusions.horizon, 2)} s ahead{seen}"
+    ahead = f"{figure(conclusions.predictions.horizon, 2)} s ahead{seen}"
     return (
         f"predictions of {signal_name(signal)} {ahead} miss by "
         f"{figure(gap.after)} {signal_unit(signal)} instead of {figure(gap.before)} (parameters "
@@ -94,19 +96,19 @@ def _misses(conclusions: Conclusions) -> str:
 
 def _left(conclusions: Conclusions) -> str:
     """The latent force that is left."""
-    what, unit = FORCES[conclusions.selection.model.plant]
-    share = conclusions.share(conclusions.last)
-    size = figure(share * conclusions.selection.force)
+    what, unit = FORCES[conclusions.selection.trials.model.plant]
+    share = conclusions.proposal.share(conclusions.proposal.last)
+    size = figure(share * conclusions.selection.trials.force)
     return f"a latent {what.split()[0]} of {size} {unit}, {percent(share)} of the drive's"
 
 
 def by_trial(conclusions: Conclusions) -> list[str]:
     """Parameters that differ by trial, a clause each."""
     said = []
-    for name in (name for move in conclusions.last.moves for name in move.slots):
+    for name in (name for move in conclusions.proposal.last.moves for name in move.slots):
         base = name.partition(TREND)[0].partition(TRIAL)[0]
-        now, path = conclusions.estimate(name), path_of(base)
-        usual = quantity_of(base).from_si(value_of(conclusions.last.fit.point, base))
+        now, path = estimate(conclusions.proposal.last.fit, name), path_of(base)
+        usual = quantity_of(base).from_si(value_of(conclusions.proposal.last.fit.point, base))
         if TREND in name:
             way = "falls" if now.value * usual < 0.0 else "rises"
             share = percent(abs(now.value / usual)) if usual else figure(abs(now.value))

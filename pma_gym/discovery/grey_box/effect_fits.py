@@ -1,0 +1,155 @@
+"""Fits of a hypothesis with one thing more."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from pma_gym.discovery.grey_box.first_fit import SHARES
+from pma_gym.discovery.grey_box.hypothesis import Hypothesis, Move, added_paths
+from pma_gym.discovery.grey_box.kept_fits import fit
+from pma_gym.discovery.grey_box.prepared_trials import PreparedTrials
+from pma_gym.discovery.grey_box.slots import presliding, quantity_of, slot, values_of
+from pma_gym.discovery.grey_box.thresholds import ODD
+from pma_gym.effects import CATALOGUE
+from pma_gym.estimation.innovations import TREND, TRIAL, GreyBox, Point, log_likelihood
+from pma_gym.estimation.likelihood_fit import Coordinate, value_of, with_tied, with_values
+
+PARTS, LESS, SLIPS = (0.3, 1.0, 3.0), (0.5, 0.1, 0.02), (0.01, 0.1, 1.0, 10.0, 100.0)
+"""Starts of a candidate.
+
+Times the size that the screening promises, shares of the latent force, and times the usual
+presliding distance.
+"""
+
+FITTED, FURTHER = 1, 2
+"""How many of them are fitted, the likeliest as they are, and in a careful fit."""
+
+MOST_FACTOR = 5.0
+"""Factor that a parameter of one trial may differ by.
+
+Beyond it no cable chain jams, and another thing is missing.
+"""
+
+
+def tried(trials: PreparedTrials, now: Hypothesis, move: Move, careful: bool = False) -> Hypothesis:
+    """Fit with a move added; `careful` from further starts."""
+    candidate = move.candidate
+    if candidate is None:
+        return _varied(trials, now, move, careful)
+    box = trials.box(candidate.beside(now.box.model), steps=now.box.rows[0].steps)
+    law, tied = CATALOGUE[candidate.effect], dict(now.fit.tied)
+    tied |= {f"{candidate.effect}.{tie[1]}": f"{candidate.effect}.{tie[0]}" for tie in law.ties}
+    absent = values_of(candidate.paths, candidate.absent)
+    at = values_of(
+        candidate.paths, candidate.grown(move.probe, float(np.clip(move.amount, -20.0, 20.0)))
+    )
+    at |= {
+        n: absent[n] for term in law.terms for n in [f"{candidate.effect}.{term[0]}"] if n in absent
+    }
+    lower, upper = candidate.bounds
+    reach = np.abs(candidate.probes - candidate.absent).max(axis=0)
+    more = []
+    for path, low, high, far in zip(candidate.paths, lower, upper, reach, strict=True):
+        if path in added_paths(candidate):
+            zero, size, least, most = (
+                quantity_of(slot(path)).to_si(float(v)) for v in (0.0, far, low, high)
+            )
+            more.append(Coordinate(slot(path), abs(size - zero) or 1.0, False, least, most))
+    more += [presliding(candidate.effect)] if "presliding" in law.scanned else []
+    here = move.start or now.fit.point
+    whole = replace(here, numbers={**box.numbers(), **here.numbers})
+    best, starts = None, _starts(trials, box, whole, at, absent, more, tied)
+    box = trials.precise(box.model, starts[0], now.box.rows[0].steps)
+    for start in starts[FITTED:][:FURTHER] if careful else starts[:FITTED]:
+        made = fit(box, start, [*now.fit.coordinates, *more], tied)
+        best = made if best is None or made.value > best.value else best
+    if best is None or best.value < now.fit.value:
+        # From none of it, a fit is no less likely than without.
+        none = with_values(whole, with_tied({**at, **absent}, tied))
+        made = fit(box, none, [*now.fit.coordinates, *more], tied, rough=True)
+        best = made if best is None or made.value > best.value else best
+    assert best is not None
+    return Hypothesis(box, best, (*now.moves, move), now.rivals)
+
+
+def _starts(
+    trials: PreparedTrials,
+    box: GreyBox,
+    whole: Point,
+    at: Mapping[str, float],
+    absent: Mapping[str, float],
+    more: Sequence[Coordinate],
+    tied: Mapping[str, str],
+) -> list[Point]:
+    """Starts of a candidate's fit, the likeliest as they are first.
+
+    One for each presliding distance, else for each latent force: these lead to other optima.
+    """
+    slips = [c for c in more if c.name not in absent]
+    points, kinds = [], []
+    for part in PARTS:
+        for less in LESS:
+            for slip in SLIPS if slips else (1.0,):
+                values = dict(at)
+                for c in more:
+                    size = absent.get(c.name, 0.0)
+                    values[c.name] = (
+                        float(np.clip(whole.numbers[c.name] * slip, c.lower, c.upper))
+                        if c in slips
+                        else size + part * (at[c.name] - size)
+                    )
+                start = with_values(whole, with_tied(values, tied))
+                points.append(weaker(trials, start, less))
+                kinds.append(slip if slips else less)
+    likely = log_likelihood(box.innovations(points), box.rows)
+    order = np.argsort(-likely)
+    first = {kind: at for at, kind in reversed([(i, kinds[i]) for i in order])}
+    return [points[i] for i in order if first[kinds[i]] == i]
+
+
+def _varied(trials: PreparedTrials, now: Hypothesis, move: Move, careful: bool) -> Hypothesis:
+    """Fit with a parameter that differs by trial.
+
+    From more starts where the latent force of that trial stands out.
+    """
+    (name,) = move.slots
+    forces = np.array(now.fit.point.forces)
+    odd = name.endswith(f"{TRIAL}{int(np.argmax(forces))}") and forces.max() > ODD * float(
+        np.median(forces)
+    )
+    mark = TREND if TREND in name else TRIAL
+    base, _, number = name.partition(mark)
+    value = value_of(now.fit.point, base)
+    old = next((c for c in now.fit.coordinates if c.name == base), Coordinate(base, abs(value)))
+    scale = abs(value) if old.logarithmic else old.scale
+    ends = sorted((value / MOST_FACTOR, value * MOST_FACTOR))
+    alone = max(old.lower, ends[0]), min(old.upper, ends[1])
+    first, bounds = (0.0, (-np.inf, np.inf)) if mark == TREND else (value, alone)
+    tied = dict(now.fit.tied)
+    tied_slots = [slot_ for slot_, of in now.fit.tied.items() if of == base]
+    tied |= {f"{tied_slot}{mark}{number}": name for tied_slot in tied_slots}
+    coordinates = [*now.fit.coordinates, Coordinate(name, scale, False, *bounds)]
+    best = None
+    further = ((0.5, 0.1), (1.0, 0.1), (-0.3, 0.1))[: 3 if careful else 1]
+    further = further if odd and mark == TRIAL else ()
+    for amount, share in ((0.0, 0.5), *further):
+        there = float(np.clip(first + amount * abs(value), *bounds))
+        start = with_values(now.fit.point, with_tied({name: there}, tied))
+        made = fit(now.box, weaker(trials, start, share), coordinates, tied, rough=not careful)
+        best = made if best is None or made.value > best.value else best
+    assert best is not None
+    return Hypothesis(now.box, best, (*now.moves, move), now.rivals)
+
+
+def weaker(trials: PreparedTrials, point: Point, share: float) -> Point:
+    """A point with a share of its latent force, in no trial more than thrice the least one.
+
+    And with no more noise than the readings show: what stood in for an effect makes room for
+    it.
+    """
+    most = 3.0 * min(point.forces) if share < 1.0 else max(point.forces)
+    least = min(SHARES) * trials.force
+    forces = tuple(max(share * min(each, most), least) for each in point.forces)
+    noise = tuple(map(min, point.deviations, trials.noise))
+    return replace(point, forces=forces, deviations=noise)

@@ -1,0 +1,153 @@
+"""The fit of the model as it came."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from pma_gym.discovery.grey_box.hypothesis import Hypothesis
+from pma_gym.discovery.grey_box.kept_fits import fit
+from pma_gym.discovery.grey_box.prepared_trials import PreparedTrials, is_rough
+from pma_gym.discovery.grey_box.slots import own_coordinates
+from pma_gym.discovery.grey_box.thresholds import ODD
+from pma_gym.estimation.innovations import GreyBox, Point, log_likelihood
+from pma_gym.estimation.likelihood_fit import Coordinate, Fit, value_of, with_tied, with_values
+from pma_gym.plant.model import Model
+
+STARTS, SMOOTH_STARTS = 8, 3
+"""Of the first fit, with and without dry friction, whose likelihood is rugged."""
+
+MOST_TRIALS = 6
+"""With so many trials at most, each is once taken for an odd one.
+
+With a large latent force of its own at the start.
+"""
+
+ODD_SHARE = 0.005
+"""Latent force, as a share of the drive's, from which on that is done."""
+
+ALIKE = 0.5
+"""Log likelihood within which three starts agree."""
+
+SCATTER = 0.2
+"""Standard deviation of a start's parameters, as a share of them."""
+
+SHARES = (0.1, 0.01, 0.03, 0.003)
+"""Latent force at the starts, as a share of the drive's.
+
+Small, so that it swallows nothing at first.
+"""
+
+DELAY_ROWS = (0.0, 0.5, 1.0, 2.0, 3.0, 5.0, 8.0, 12.0)
+"""Delays (rows) of which a start takes the likeliest."""
+
+
+def first_fit(
+    trials: PreparedTrials, seed: int, tell: Callable[[str, int, int], None]
+) -> Hypothesis:
+    """The model as it came, fitted; `tell` is called with what is done of its total."""
+    own, tied = own_coordinates(trials.box(trials.model))
+    coordinates = [*own, *trials.nuisances()]
+    rough, number = is_rough(trials.model), len(trials.logged)
+    count = STARTS if rough else SMOOTH_STARTS
+    kinds: Sequence[bool] = (False, True)
+    fits: dict[bool, list[Fit]] = {linear: [] for linear in kinds}
+    first = _begin(trials, seed, trials.box(trials.model), coordinates, tied, 0, -1)
+    boxes = [trials.precise(trials.model, first, linear=linear) for linear in kinds]
+    trials.steps = max(box.rows[0].steps for box in boxes)
+
+    def start(k: int, odd: int) -> None:
+        for linear in kinds:
+            # It may end after three: between that and all, until then.
+            tell("refitting parameters", k, count + 2 if k > 3 else (count + 3) // 2)
+            box = trials.box(trials.model, linear)
+            fits[linear].append(
+                fit(box, _begin(trials, seed, box, coordinates, tied, k, odd), coordinates, tied)
+            )
+
+    for k in range(count):
+        start(k, -1)
+        kinds = (max(fits, key=lambda each: max(f.value for f in fits[each])),) if k else kinds
+        values = sorted(f.value for f in fits[kinds[0]])
+        if len(values) > 2 and values[-1] - values[-3] < ALIKE:
+            break
+    trials.linear = kinds[0]
+    if rough:
+        best = max(fits[trials.linear], key=lambda each: each.value)
+        for linear in fits:
+            fits[linear] += hold_fits(trials, best, trials.model, linear, trials.steps)
+        trials.linear = max(fits, key=lambda each: max(f.value for f in fits[each]))
+    forces = max(fits[trials.linear], key=lambda each: each.value).point.forces
+    if (
+        3 <= number <= MOST_TRIALS
+        and max(forces) > ODD * min(forces)
+        and max(forces) > ODD_SHARE * trials.force
+    ):
+        for odd in range(number):
+            start(0, odd)
+    best = max(fits[trials.linear], key=lambda each: each.value)
+    return Hypothesis(trials.box(trials.model), best)
+
+
+def _begin(
+    trials: PreparedTrials,
+    seed: int,
+    box: GreyBox,
+    coordinates: Sequence[Coordinate],
+    tied: Mapping[str, str],
+    k: int,
+    odd: int,
+) -> Point:
+    """Start number k: the first is the model as it came, the last have one odd trial."""
+    generator = np.random.default_rng((seed, k))
+    memory = float(np.sqrt(trials.memory[0] * trials.memory[1])) if k % 2 else trials.memory[0]
+    shares = [SHARES[k % 4] if odd < 0 or i != odd else 1.0 for i in range(len(trials.logged))]
+    point = Point(
+        box.numbers(), tuple(trials.noise), tuple(share * trials.force for share in shares), memory
+    )
+    own = [c for c in coordinates if c.name in point.numbers]
+    factors = (
+        np.exp(SCATTER * generator.standard_normal(len(own)))
+        if k and odd < 0
+        else np.ones(len(own))
+    )
+    values = {
+        c.name: float(np.clip(value_of(point, c.name) * f, c.lower, c.upper))
+        for c, f in zip(own, factors, strict=True)
+    }
+    point = with_values(point, with_tied(values, tied))
+    late = [
+        replace(point, delay=rows * trials.span)
+        for rows in DELAY_ROWS[: 1 if k == 0 or coordinates[-1].name != "delay" else None]
+    ]
+    return late[int(np.argmax(log_likelihood(box.innovations(late), box.rows)))]
+
+
+def hold_fits(
+    trials: PreparedTrials, best: Fit, model: Model, linear: bool, steps: int
+) -> list[Fit]:
+    """Fits with commands held or linear between rows, from a fit that has them either way.
+
+    A held command is a line half a row later. Friction that begins to slip too late hides
+    which it is, so that both begin a second time with a tenth of the presliding distance.
+    """
+    box, point = trials.box(model, linear, steps), best.point
+    row = 0.5 * trials.span / trials.stride / trials.block * (int(linear) - int(trials.linear))
+    late = any(c.name == "delay" for c in best.coordinates)
+    fits = []
+    for sooner in (1.0, 0.1) if is_rough(model) else (1.0,):
+        slip = {n: sooner * v for n, v in point.numbers.items() if n.endswith(".presliding")}
+        start = with_values(point, {**slip, "delay": max(0.0, point.delay + row * late)})
+        fits.append(fit(box, start, best.coordinates, best.tied, rough=True))
+    return fits
+
+
+def unmoved(trials: PreparedTrials, base: Hypothesis) -> Hypothesis:
+    """The model's own parameters as they came, with noise and latent force fitted."""
+    own = base.box.numbers()
+    free = [c for c in base.fit.coordinates if c.name not in own and c.name != "delay"]
+    start = Point(
+        own, base.fit.point.deviations, (0.1 * trials.force,) * len(trials.logged), trials.memory[0]
+    )
+    made = fit(base.box, start, free, {})
+    return replace(base, fit=replace(made, coordinates=base.fit.coordinates, tied=base.fit.tied))

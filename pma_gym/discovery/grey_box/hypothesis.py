@@ -1,0 +1,73 @@
+"""What a model may lack, and a model with what was added."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
+from pma_gym.discovery.grey_box.slots import slot
+from pma_gym.effects import CATALOGUE
+from pma_gym.estimation.innovations import GreyBox, Point
+from pma_gym.estimation.likelihood_fit import Fit
+
+
+@dataclass(frozen=True)
+class Move:
+    """One thing that a model may lack: an effect, or a parameter that differs by trial.
+
+    Attributes:
+        name: of the effect, or the parameter's slot with its mark.
+        promise: gain of log likelihood that the screening promises.
+        numbers: how many it adds.
+        candidate: the effect.
+        probe: its most promising probe.
+        amount: how many times the probe's size.
+        slots: of parameters by trial.
+        start: where its fit begins, if not at what it is added to.
+    """
+
+    name: str
+    promise: float
+    numbers: int
+    candidate: CandidateEffect | None = None
+    probe: int = 0
+    amount: float = 0.0
+    slots: tuple[str, ...] = ()
+    start: Point | None = None
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """A model with what was added, and its fit.
+
+    Attributes:
+        box: its filter.
+        fit: its fit.
+        moves: what was added.
+        rivals: names of moves that would have done as well as the last one.
+        alike: hypotheses with these in the place of the last move.
+    """
+
+    box: GreyBox
+    fit: Fit
+    moves: tuple[Move, ...] = ()
+    rivals: tuple[tuple[str, ...], ...] = ()
+    alike: tuple["Hypothesis", ...] = ()
+
+    @property
+    def readings(self) -> int:
+        """How many readings it is fitted to."""
+        return sum(int(trial.there.sum()) for trial in self.box.rows)
+
+    def price_of(self, numbers: int) -> float:
+        """Log likelihood that so many further numbers must gain (BIC)."""
+        return 0.5 * numbers * float(np.log(self.readings))
+
+
+def added_paths(candidate: CandidateEffect) -> list[str]:
+    """Paths of a candidate that are fitted with it: ties and further terms stay out."""
+    law = CATALOGUE[candidate.effect]
+    apart = {stem for tie in law.ties for stem in tie[1:]} | {
+        stem for term in law.terms for stem in term
+    }
+    return [path for path in candidate.fitted_paths if slot(path).partition(".")[2] not in apart]

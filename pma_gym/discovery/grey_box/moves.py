@@ -1,0 +1,160 @@
+"""Screening of what a model may lack: what is worth a fit."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
+from pma_gym.discovery.grey_box.hypothesis import Hypothesis, Move, added_paths
+from pma_gym.discovery.grey_box.prepared_trials import PreparedTrials
+from pma_gym.discovery.grey_box.slots import gains_of_drive, values_of
+from pma_gym.discovery.grey_box.thresholds import ODD, TRIED
+from pma_gym.estimation.innovations import TREND, TRIAL
+from pma_gym.estimation.likelihood_fit import STEP, Coordinate, with_tied, with_values
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Screening:
+    """A screening of what may be added to a hypothesis.
+
+    Attributes:
+        trials: with the model as it came.
+        candidates: effects that may be missing.
+        unmoved: the model's own parameters as they came.
+        tell: called with what is being done, what is done of it and its total.
+    """
+
+    trials: PreparedTrials
+    candidates: Sequence[CandidateEffect]
+    unmoved: Hypothesis
+    tell: Callable[[str, int, int], None]
+
+    def worth_a_fit(self, now: Hypothesis) -> list[Move]:
+        """The moves that promise half their price.
+
+        Where there is a latent force, the first ones whatever they promise, and each parameter of a
+        trial whose latent force stands out.
+        """
+        moves, bent = self._moves(now), self.trials.is_bent(now.fit.point)
+        if not now.moves:
+            # A model that lacks much is bent by its fit: its lack is looked for from the model as
+            # it came too.
+            fresh = [
+                replace(move, start=self.unmoved.fit.point)
+                for move in self._moves(self.unmoved)
+                if move.candidate
+            ]
+            if bent:
+                moves = [*moves[:TRIED], *fresh[:TRIED], *moves[TRIED:]]
+                return moves[: 2 * TRIED] + _odd(now, moves[2 * TRIED :])
+        price = 0.5 * (0.5 * np.log(now.readings) + np.log(len(moves)))
+        if not bent:
+            return [move for move in moves[:TRIED] if move.promise > price]
+        return [*moves[:TRIED], *_odd(now, moves[TRIED:])]
+
+    def _moves(self, now: Hypothesis) -> list[Move]:
+        """All that may be added, by what it promises less its price, the most first."""
+        fitted, box = now.fit, now.box
+        own = {c.name for c in fitted.coordinates}
+        drive = [
+            Coordinate(name, abs(fitted.point.numbers[name]))
+            for name in gains_of_drive(self.trials.model)
+            if name not in own
+        ]
+        mean = [
+            *drive,
+            *(c for c in fitted.coordinates if " " not in c.name and c.name != "memory"),
+        ]
+        beside = [
+            with_values(
+                fitted.point, with_tied({c.name: c.value(c.of(fitted.point) + STEP)}, fitted.tied)
+            )
+            for c in mean
+        ]
+        white = self.trials.white(box, [fitted.point, *beside])
+        error, slopes = white[0], np.nan_to_num((white[1:] - white[0]) / STEP)
+        basis = np.linalg.qr(slopes[len(drive) :].T)[0]
+
+        def beyond(rows: Array) -> Array:
+            return rows - (rows @ basis) @ basis.T
+
+        left = beyond(error)
+        moves = [
+            *self._effects(now, error, left, beyond),
+            *_by_trial(now, mean, slopes, left, beyond),
+        ]
+        price = 0.5 * np.log(len(error))
+        return sorted(moves, key=lambda move: move.numbers * price - move.promise)
+
+    def _effects(
+        self, now: Hypothesis, error: Array, left: Array, beyond: Callable[[Array], Array]
+    ) -> list[Move]:
+        added = {move.candidate.name for move in now.moves if move.candidate}
+        moves = []
+        for number, candidate in enumerate(self.candidates):
+            self.tell("screening effects", number, len(self.candidates))
+            if candidate.name in added:
+                continue
+            box = self.trials.box(candidate.beside(now.box.model), steps=now.box.rows[0].steps)
+            whole = replace(now.fit.point, numbers={**box.numbers(), **now.fit.point.numbers})
+            probes = self.trials.white(
+                box,
+                [with_values(whole, values_of(candidate.paths, row)) for row in candidate.probes],
+            )
+            best = Move(candidate.name, -np.inf, 0)
+            for i, row in enumerate(probes):
+                change = beyond(row - error)
+                square = float(change @ change)
+                if not np.isfinite(square) or square < 1e-9:
+                    continue
+                amount = -float(left @ change) / square
+                if amount < 0.0 and not candidate.signs[i]:
+                    continue
+                if (promise := 0.5 * amount**2 * square) > best.promise:
+                    best = Move(
+                        candidate.name, promise, len(added_paths(candidate)), candidate, i, amount
+                    )
+            moves += [best] if best.candidate else []
+        return moves
+
+
+def _by_trial(
+    now: Hypothesis,
+    mean: Sequence[Coordinate],
+    slopes: Array,
+    left: Array,
+    beyond: Callable[[Array], Array],
+) -> list[Move]:
+    """Each parameter in one trial alone, with a trend over the trials."""
+    count = len(now.box.rows)
+    if count < 3:
+        return []
+    of = np.concatenate(
+        [np.full(int(trial.there.sum()), i) for i, trial in enumerate(now.box.rows)]
+    )
+    moves = []
+    for c, slope in zip(mean, slopes, strict=True):
+        alone = TREND in c.name or TRIAL in c.name
+        if alone or c.name == "delay" or c.name.endswith("presliding"):
+            continue
+        columns = {f"{c.name}{TREND}": slope * now.box.order[of]}
+        columns |= {f"{c.name}{TRIAL}{i}": slope * (of == i) for i in range(count)}
+        for name, column in columns.items():
+            change = beyond(column)
+            square = float(change @ change)
+            if square > 1e-9:
+                promise = 0.5 * float(left @ change) ** 2 / square
+                moves.append(Move(name, promise, 1, slots=(name,)))
+    return moves
+
+
+def _odd(now: Hypothesis, moves: Sequence[Move]) -> list[Move]:
+    """Each parameter of the trial whose latent force stands out."""
+    forces = np.array(now.fit.point.forces)
+    odd = int(np.argmax(forces))
+    alone = len(forces) > 2 and forces[odd] > ODD * float(np.median(forces))
+    return [move for move in moves if alone and move.name.endswith(f"{TRIAL}{odd}")]

@@ -1,0 +1,202 @@
+"""What the trials of a rig say before any fit, and how a model is run over them."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pma_gym.discovery.grey_box.thresholds import FAINT, LOUD
+from pma_gym.effects.effect import signals
+from pma_gym.estimation.innovations import GreyBox, Point, Rows
+from pma_gym.estimation.likelihood_fit import Coordinate
+from pma_gym.estimation.logged import Logged
+from pma_gym.plant.model import Model
+
+Array = NDArray[np.float64]
+
+PRECISE, MOST_STEPS, SHORTEST_S = 1.0, 200_000, 1e-4
+"""Integration steps are halved until that changes all innovations by less.
+
+Sum of their squares, in their deviations, so that log likelihoods are right to about one unit. And
+steps of all trials together at most, and the shortest step: where friction turns, no step is short
+enough for such precision.
+"""
+
+MOST_ROWS = 8_000
+"""Of all trials together.
+
+More are averaged in blocks, as long as the motion bends less in one than its noise; of what is more
+still, every second, third ... block is read.
+"""
+
+BENT = 0.2
+"""That bend at most, in standard deviations of a block's noise."""
+
+LEAST_FORCE = 1e-6
+"""Least latent force, as a share of the drive's."""
+
+MOST_DELAY = 20.0
+"""Longest delay, in rows."""
+
+
+class PreparedTrials:
+    """Trials with their noise, rows and steps, over which models are run.
+
+    Whether commands are linear between rows, and the least integration steps a row, are as the
+    likeliest fit so far has them.
+
+    Args:
+        model: the model as it came.
+        logged: the trials.
+        threads: that filters run in at once.
+    """
+
+    def __init__(self, model: Model, logged: Sequence[Logged], threads: int) -> None:
+        self.model, self.logged, self.threads = model, list(logged), threads
+        self.linear = False
+        self.channels = [
+            i for i in range(len(model.rig.signals)) if any(each.measures[i] for each in logged)
+        ]
+        readings = [
+            [each.measured[c][each.counts[c] > 0] for each in logged] for c in self.channels
+        ]
+        self.steps_of_readings = [reading_step(rows) for rows in readings]
+        self.noise = [
+            max(white_noise(rows), s / 12**0.5)
+            for rows, s in zip(readings, self.steps_of_readings, strict=True)
+        ]
+        self.coarse = [
+            white_noise(rows) < s for rows, s in zip(readings, self.steps_of_readings, strict=True)
+        ]
+        self.block = self._block(readings)
+        total = sum(len(each.time) for each in logged) / self.block
+        self.stride = max(1, int(total / MOST_ROWS))
+        self.steps = max(1, self.stride * self.block // 8)
+        self.span = (
+            self.stride
+            * self.block
+            * float(np.median(np.concatenate([np.diff(each.time) for each in logged])))
+        )
+        longest = max(float(each.time[-1] - each.time[0]) for each in logged)
+        self.memory = 4.0 * self.span, max(longest / 5.0, 8.0 * self.span)
+        self.noise = [n / self.block**0.5 for n in self.noise]
+        self._rows: dict[tuple[int, bool, bool], list[Rows]] = {}
+        self.force = self._force()
+
+    def _block(self, readings: Sequence[Sequence[Array]]) -> int:
+        total, block = sum(len(each.time) for each in self.logged), 1
+        while total / block > MOST_ROWS:
+            wider = block + 1
+            bends = [
+                np.sqrt(np.mean(np.concatenate([np.diff(row[::wider], 2) for row in rows]) ** 2))
+                / 24.0
+                for rows in readings
+            ]
+            if any(b > BENT * n / wider**0.5 for b, n in zip(bends, self.noise, strict=True)):
+                break
+            block = wider
+        return block
+
+    def _force(self) -> float:
+        """Force of the drive (N, N m) at the root mean square of its command."""
+        motor = np.concatenate([each.motor for each in self.logged])
+        middle = float(np.median(motor))
+        level = float(np.sqrt(np.mean((motor - middle) ** 2))) or 1.0
+        (drive,) = [e for e in self.model.effects.values() if e.port == self.model.rig.drive_port]
+        assert drive.law is not None
+        known = {"p": self.model.parameters[drive.name], "spin": 0.0}
+        forces = []
+        for command in (middle + level, middle):
+            at = {**known, "command": command, "motor_voltage": command}
+            forces.append(drive.law(*(at[name] for name in signals(drive.law))))
+        return abs(forces[0] - forces[1]) or 1.0
+
+    def box(self, model: Model, linear: bool | None = None, steps: int = 0) -> GreyBox:
+        """The filter of a model over the trials, with so many integration steps a row."""
+        steps = steps or self.steps
+        linear = self.linear if linear is None else linear
+        # Where friction turns nothing is smooth: extrapolation would only make more of it.
+        key = steps, linear, not is_rough(model)
+        if key not in self._rows:
+            how = self.channels, steps, linear, self.block, self.stride, self.coarse, key[2]
+            self._rows[key] = [Rows(each, *how) for each in self.logged]
+        return GreyBox(model, self._rows[key], self.channels, self.threads)
+
+    def precise(
+        self, model: Model, point: Point, steps: int = 0, linear: bool | None = None
+    ) -> GreyBox:
+        """The filter of a model with as many steps as it needs at a point, at least so many.
+
+        Beside next to no latent force: what it makes uncertain needs less.
+        """
+        rows, steps = self.stride * self.block, steps or self.steps
+        point = replace(point, forces=(LEAST_FORCE * self.force,) * len(self.logged))
+        total = sum(float(each.time[-1] - each.time[0]) for each in self.logged)
+        most = min(MOST_STEPS * self.span / total, self.span / SHORTEST_S)
+        box = self.box(model, linear, steps)
+        white = self.white(box, [point])
+        while 2 * steps <= most:
+            # Where several rows are one step, the next has each by itself.
+            steps = rows if steps < rows < 2 * steps else 2 * steps
+            finer = self.box(model, linear, steps)
+            before, white = white, self.white(finer, [point])
+            if np.sum((white - before) ** 2) < PRECISE:
+                break
+            box = finer
+        return box
+
+    def white(self, box: GreyBox, points: Sequence[Point]) -> Array:
+        """Innovations over their deviations, shape (points, readings)."""
+        with np.errstate(all="ignore"):
+            rows = [
+                (errors / np.sqrt(spreads)).reshape(len(points), -1)[:, trial.there.ravel()]
+                for (errors, spreads), trial in zip(box.innovations(points), box.rows, strict=True)
+            ]
+        return np.concatenate(rows, axis=1)
+
+    def nuisances(self) -> list[Coordinate]:
+        """Coordinates of the noises, the latent force and the delay."""
+        pairs = zip(self.noise, self.steps_of_readings, strict=True)
+        noise = [
+            Coordinate(f"noise {i}", 1.0, True, max(1e-3 * n, s / 12**0.5), 1e3 * n)
+            for i, (n, s) in enumerate(pairs)
+        ]
+        forces = [
+            Coordinate(f"force {i}", 1.0, True, LEAST_FORCE * self.force, 10.0 * self.force)
+            for i in range(len(self.logged))
+        ]
+        least, most = self.memory
+        memory = Coordinate("memory", 1.0, True, 0.75 * least, most)
+        late = any(effect.port == "drive_delay" for effect in self.model.effects.values())
+        delay = [] if late else [Coordinate("delay", self.span, False, 0.0, MOST_DELAY * self.span)]
+        return [*noise, *forces, memory, *delay]
+
+    def is_bent(self, point: Point, share: float = FAINT) -> bool:
+        """Whether a latent force, or more noise than the readings show, stands in for something."""
+        noisy = [d > LOUD * n for d, n in zip(point.deviations, self.noise, strict=True)]
+        return max(point.forces) > share * self.force or any(noisy)
+
+
+def is_rough(model: Model) -> bool:
+    """Whether a model has dry friction, or another law of the way."""
+    return any(effect.rate_independent_law for effect in model.effects.values())
+
+
+def reading_step(rows: Sequence[Array]) -> float:
+    """Step that readings keep to (SI); 0 where they keep to none."""
+    levels = np.unique(np.concatenate(rows))
+    apart = np.diff(levels)
+    apart = apart[apart > 1e-9 * max(float(np.abs(levels).max()), 1e-300)]
+    if not len(apart):
+        return 0.0
+    step = float(np.median(apart[apart < 1.5 * apart.min()]))
+    whole = np.abs(apart / step - np.round(apart / step)) < 0.1
+    return step if whole.mean() > 0.9 else 0.0
+
+
+def white_noise(rows: Sequence[Array]) -> float:
+    """Standard deviation of white noise by third differences (squared weights sum to 20)."""
+    third = np.concatenate([np.diff(row, 3) for row in rows if len(row) > 3])
+    robust = 1.4826 * float(np.median(np.abs(third)))
+    return max(robust, 0.3 * float(np.std(third)), 1e-12) / 20**0.5

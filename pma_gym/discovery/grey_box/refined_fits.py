@@ -1,0 +1,112 @@
+"""Fits of a hypothesis in other words: fuller laws, other commands between rows, a trend."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
+from pma_gym.discovery.grey_box.effect_fits import tried, weaker
+from pma_gym.discovery.grey_box.first_fit import hold_fits
+from pma_gym.discovery.grey_box.hypothesis import Hypothesis, Move
+from pma_gym.discovery.grey_box.kept_fits import fit
+from pma_gym.discovery.grey_box.prepared_trials import PreparedTrials
+from pma_gym.discovery.grey_box.slots import quantity_of, slot, values_of
+from pma_gym.discovery.grey_box.thresholds import LIKE, LINE
+from pma_gym.effects import CATALOGUE
+from pma_gym.estimation.innovations import TREND, TRIAL, value_in_trial
+from pma_gym.estimation.likelihood_fit import Coordinate, value_of, with_tied, with_values
+
+WIDER = (1.0, 0.2, 5.0)
+"""Times the usual shape (a Stribeck speed) from which the fuller law of an effect is fitted."""
+
+
+def refined(trials: PreparedTrials, now: Hypothesis) -> Hypothesis:
+    """With the simpler laws of the added effects freed where that is worth its price."""
+    for candidate in [move.candidate for move in now.moves if move.candidate]:
+        law = CATALOGUE[candidate.effect]
+        for row in (*law.ties, *law.terms):
+            larger = _freed(trials, now, candidate, row, tie=row in law.ties)
+            gain = larger.fit.value - now.fit.value
+            numbers = len(larger.fit.coordinates) - len(now.fit.coordinates)
+            if gain > now.price_of(numbers) + LIKE:
+                now = larger
+    return now
+
+
+def _freed(
+    trials: PreparedTrials,
+    now: Hypothesis,
+    candidate: CandidateEffect,
+    row: Sequence[str],
+    tie: bool,
+) -> Hypothesis:
+    """A hypothesis with the parameters of a tie, or of a further term, free."""
+    point, effect = now.fit.point, candidate.effect
+    names = [f"{effect}.{stem}" for stem in (row[1:] if tie else row)]
+    probe = values_of(candidate.paths, candidate.probes[len(candidate.probes) // 2])
+    tied = {slot_: of for slot_, of in now.fit.tied.items() if slot_ not in names}
+    more, values = [], {}
+    for path in candidate.paths:
+        if (name := slot(path)) in names and path in candidate.fitted_paths:
+            quantity = quantity_of(name)
+            low, high = (quantity.to_si(end) for end in (quantity.lower, quantity.upper))
+            follows = now.fit.tied.get(name)
+            values[name] = 0.8 * point.numbers[follows] if follows else probe[name]
+            more.append(Coordinate(name, abs(values[name]) or 1.0, False, low, high))
+    if not more:
+        return now
+    # What is free already begins again from other shapes.
+    coordinates = {c.name: c for c in (*now.fit.coordinates, *more)}.values()
+    best = now.fit
+    for wide in WIDER:
+        shaped = {n: v * (1.0 if n in now.fit.tied else wide) for n, v in values.items()}
+        start = with_values(point, with_tied(shaped, tied))
+        made = fit(now.box, weaker(trials, start, 0.3), list(coordinates), tied)
+        best = made if made.value > best.value else best
+    return replace(now, fit=best)
+
+
+def other_hold(trials: PreparedTrials, now: Hypothesis) -> Hypothesis:
+    """The same hypothesis, with commands between rows the other way if that is likelier."""
+    steps, kinds = now.box.rows[0].steps, (trials.linear, not trials.linear)
+    fits = [(f, k) for k in kinds for f in hold_fits(trials, now.fit, now.box.model, k, steps)]
+    made, linear = max(fits, key=lambda pair: pair[0].value)
+    if made.value < now.fit.value + LIKE:
+        return now
+    trials.linear = linear
+    return replace(now, box=trials.box(now.box.model, linear, steps), fit=made)
+
+
+def trend_instead(trials: PreparedTrials, now: Hypothesis) -> Hypothesis:
+    """With a trend in place of several trials that each have a parameter of their own."""
+    of = [slot_.partition(TRIAL)[0] for move in now.moves for slot_ in move.slots]
+    for base in {each for each in of if of.count(each) > 1}:
+        gone = {name for name in now.fit.point.numbers if name.startswith(f"{base}{TRIAL}")}
+        gone |= {slot_ for slot_, name in now.fit.tied.items() if name in gone}
+        numbers = {n: v for n, v in now.fit.point.numbers.items() if n not in gone}
+        less = replace(
+            now.fit,
+            point=replace(now.fit.point, numbers=numbers),
+            coordinates=tuple(c for c in now.fit.coordinates if c.name not in gone),
+            tied={n: of_ for n, of_ in now.fit.tied.items() if n not in gone},
+        )
+        kept = tuple(move for move in now.moves if not gone & set(move.slots))
+        order, numbered = now.box.order, range(len(now.box.rows))
+        values = [value_in_trial(now.fit.point, base, i, order) for i in numbered]
+        off = values - np.polyval(np.polyfit(order, values, 1), order)
+        if np.abs(off).max() < LINE * np.ptp(values):
+            move = Move(f"{base}{TREND}", 0.0, 1, slots=(f"{base}{TREND}",))
+            now = tried(trials, Hypothesis(now.box, less, kept, now.rivals), move, careful=True)
+    return now
+
+
+def again(now: Hypothesis, larger: Hypothesis) -> Hypothesis:
+    """A hypothesis fitted again from where another one ended."""
+    shared = {c.name for c in larger.fit.coordinates}
+    values = {
+        c.name: value_of(larger.fit.point, c.name) for c in now.fit.coordinates if c.name in shared
+    }
+    start = with_values(now.fit.point, with_tied(values, now.fit.tied))
+    made = fit(now.box, start, now.fit.coordinates, now.fit.tied)
+    return replace(now, fit=max(made, now.fit, key=lambda each: each.value))
