@@ -47,7 +47,7 @@ def trial_records(findings: Findings) -> tuple[TrialRecord, ...]:
             column = BY_QUANTITY[signal.name]
             factor = SI_FACTORS[column.unit]
             started_off, refitted_off, after_off = (
-                _rms(curve[channel] - measured[channel]) / factor for curve in curves
+                rms(curve[channel] - measured[channel]) / factor for curve in curves
             )
             floor = findings.floors[channel].level / factor
             gaps[column.name] = Gap(started_off, refitted_off, after_off, floor, unseen is not None)
@@ -151,5 +151,6 @@ def _zeroed(logged: Logged, held: Array, measured: Array) -> Array:
     return curve
 
 
-def _rms(off: Array) -> float:
+def rms(off: Array) -> float:
+    """Root mean square, of what is there."""
     return float(np.sqrt(np.nanmean(off**2)))

@@ -9,11 +9,11 @@ from numpy.typing import NDArray
 
 from pma_gym.data.datasets.dataset import NamedTrial
 from pma_gym.data.trial_columns import BY_QUANTITY
-from pma_gym.discovery.answer.trial_records import gaps
+from pma_gym.discovery.answer.trial_records import gaps, rms
 from pma_gym.discovery.diagnosis import Verdict
 from pma_gym.discovery.grey_box.effect_selection import EffectSelection
 from pma_gym.discovery.grey_box.latent_law import latent_force, latent_law, latent_line
-from pma_gym.discovery.grey_box.predictions import Predictions, rms
+from pma_gym.discovery.grey_box.predictions import Predictions
 from pma_gym.discovery.grey_box.proposal import Proposal
 from pma_gym.discovery.grey_box.sizes import estimate, named_effects
 from pma_gym.discovery.grey_box.slots import path_of, quantity_of, slot, with_numbers

@@ -59,17 +59,16 @@ def tried(trials: PreparedTrials, now: Hypothesis, move: Move, careful: bool = F
     more += [presliding(candidate.effect)] if "presliding" in law.scanned else []
     here = move.start or now.fit.point
     whole = replace(here, numbers={**box.numbers(), **here.numbers})
-    best, starts = None, _starts(trials, box, whole, at, absent, more, tied)
+    starts = _starts(trials, box, whole, at, absent, more, tied)
+    coordinates = [*now.fit.coordinates, *more]
     box = trials.precise(box.model, starts[0], now.box.rows[0].steps)
-    for start in starts[FITTED:][:FURTHER] if careful else starts[:FITTED]:
-        made = fit(box, start, [*now.fit.coordinates, *more], tied)
-        best = made if best is None or made.value > best.value else best
-    if best is None or best.value < now.fit.value:
+    chosen = starts[FITTED:][:FURTHER] if careful else starts[:FITTED]
+    fits = [fit(box, start, coordinates, tied) for start in chosen]
+    if all(made.value < now.fit.value for made in fits):
         # From none of it, a fit is no less likely than without.
         none = with_values(whole, with_tied({**at, **absent}, tied))
-        made = fit(box, none, [*now.fit.coordinates, *more], tied, rough=True)
-        best = made if best is None or made.value > best.value else best
-    assert best is not None
+        fits += [fit(box, none, coordinates, tied, rough=True)]
+    best = max(fits, key=lambda made: made.value)
     return Hypothesis(box, best, (*now.moves, move), now.rivals)
 
 
@@ -130,15 +129,14 @@ def _varied(trials: PreparedTrials, now: Hypothesis, move: Move, careful: bool) 
     tied_slots = [slot_ for slot_, of in now.fit.tied.items() if of == base]
     tied |= {f"{tied_slot}{mark}{number}": name for tied_slot in tied_slots}
     coordinates = [*now.fit.coordinates, Coordinate(name, scale, False, *bounds)]
-    best = None
+    fits = []
     further = ((0.5, 0.1), (1.0, 0.1), (-0.3, 0.1))[: 3 if careful else 1]
     further = further if odd and mark == TRIAL else ()
     for amount, share in ((0.0, 0.5), *further):
         there = float(np.clip(first + amount * abs(value), *bounds))
         start = with_values(now.fit.point, with_tied({name: there}, tied))
-        made = fit(now.box, weaker(trials, start, share), coordinates, tied, rough=not careful)
-        best = made if best is None or made.value > best.value else best
-    assert best is not None
+        fits += [fit(now.box, weaker(trials, start, share), coordinates, tied, rough=not careful)]
+    best = max(fits, key=lambda made: made.value)
     return Hypothesis(now.box, best, (*now.moves, move), now.rivals)
 
 

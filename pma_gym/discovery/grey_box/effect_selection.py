@@ -187,11 +187,11 @@ def _cost(now: Hypothesis, move: Move) -> int:
 
 def _at_end(each: Hypothesis) -> bool:
     """Whether a parameter of one trial has gone as far as it may."""
-    for name in each.moves[-1].slots:
-        coordinate, value = each.fit.coordinates[-1], value_of(each.fit.point, name)
-        if TRIAL in name and not coordinate.lower * 1.01 < value < coordinate.upper * 0.99:
-            return True
-    return False
+    last = each.fit.coordinates[-1]
+    return any(
+        TRIAL in name and not last.lower * 1.01 < value_of(each.fit.point, name) < last.upper * 0.99
+        for name in each.moves[-1].slots
+    )
 
 
 def _densities(each: Hypothesis) -> Array:

@@ -40,7 +40,7 @@ class Screening:
         trial whose latent force stands out.
         """
         moves, bent = self._moves(now), self.trials.is_bent(now.fit.point)
-        if not now.moves:
+        if bent and not now.moves:
             # A model that lacks much is bent by its fit: its lack is looked for from the model as
             # it came too.
             fresh = [
@@ -48,9 +48,8 @@ class Screening:
                 for move in self._moves(self.unmoved)
                 if move.candidate
             ]
-            if bent:
-                moves = [*moves[:TRIED], *fresh[:TRIED], *moves[TRIED:]]
-                return moves[: 2 * TRIED] + _odd(now, moves[2 * TRIED :])
+            moves = [*moves[:TRIED], *fresh[:TRIED], *moves[TRIED:]]
+            return moves[: 2 * TRIED] + _odd(now, moves[2 * TRIED :])
         price = 0.5 * (0.5 * np.log(now.readings) + np.log(len(moves)))
         if not bent:
             return [move for move in moves[:TRIED] if move.promise > price]

@@ -7,6 +7,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from pma_gym.discovery.answer.trial_records import rms
 from pma_gym.discovery.grey_box.hypothesis import Hypothesis
 from pma_gym.discovery.grey_box.kept_fits import fit
 from pma_gym.discovery.grey_box.prepared_trials import PreparedTrials
@@ -99,8 +100,3 @@ class Predictions:
         late = {"delay": 0.0}
         point = with_values(base.fit.point, with_tied({**values, **late}, base.fit.tied))
         return predictions(base.box, point, self.horizon)
-
-
-def rms(off: Array) -> float:
-    """Root mean square, of what is there."""
-    return float(np.sqrt(np.nanmean(off**2)))
