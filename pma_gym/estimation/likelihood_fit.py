@@ -117,7 +117,7 @@ class Fit:
     @cached_property
     def curvature(self) -> Array:
         """Covariance that the expected information alone gives, shape (p, p), in these units."""
-        return np.linalg.pinv(self.information)
+        return np.asarray(np.linalg.pinv(self.information), float)
 
     @cached_property
     def deviations(self) -> dict[str, float]:
