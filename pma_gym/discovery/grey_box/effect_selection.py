@@ -26,8 +26,8 @@ BEAM, BESIDE = 3, 3
 COST, AFTER = 3, 1.5
 """For the time left.
 
-What an effect's fits take, in those of a parameter by trial; the same for fits that begin far off,
-in others. What a stage takes, in its moves' fits.
+What a fit takes that needs shorter steps than the one before, in others; what a stage takes, in
+its moves' fits.
 """
 
 DELAYS = ("drive_delay", "lvdt_delay", "tachometer_delay", "encoder_delay", "gyroscope_delay")

@@ -58,7 +58,7 @@ class Predictions:
     def holds_out(self, each: Hypothesis) -> bool:
         """Whether trials can be left out.
 
-        A parameter of one trial alone cannot be told by the others.
+        A parameter of one trial alone cannot be estimated from the others.
         """
         return len(self.trials.logged) > 1 and not any(TRIAL in move.name for move in each.moves)
 

@@ -11,9 +11,9 @@ Assumption, what the force constant of a drive is known to. A latent force below
 """
 
 LIKE = 3.0
-"""Difference of log likelihood, after the price, within which two hypotheses are rivals.
+"""Difference of log likelihood, after the price, within which two hypotheses are always rivals.
 
-Odds of 20 to 1.
+Odds of 20 to 1. Beyond it they are where the difference is within its own scatter.
 """
 
 LEFT = 0.5

@@ -8,6 +8,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
+from pma_gym.discovery.answer.trial_records import rms
 from pma_gym.discovery.diagnosis import Diagnosis
 from pma_gym.discovery.report.figure_text import figure
 from pma_gym.discovery.report.pictures import AFTER, PARAMETERS, after_name
@@ -27,7 +28,7 @@ _MOST_OVER_TIME, _MOST_TRIALS = 4, 12
 def latent_picture(diagnosis: Diagnosis) -> bytes:
     """Over time, position, speed and command, with its law drawn in, and its size by trial."""
     forces = [(each.name, each.time, each.latent) for each in diagnosis.trials if each.latent]
-    forces.sort(key=lambda each: -_rms(each[2].before))
+    forces.sort(key=lambda each: -rms(each[2].before))
     latent, timed = [force for *_, force in forces], forces[:_MOST_OVER_TIME]
     names, quantity = list(latent[0].over), latent[0].quantity
     rows = [[i, i] for i in range(len(timed))] + [names[:2], [names[2], "rms"]]
@@ -86,7 +87,7 @@ def _by_trial(panel: Axes, forces: list[tuple[str, Array, LatentForce]]) -> None
     """Root mean square of each trial, the largest on top."""
     at = -np.arange(float(len(forces)))
     for shift, color, part in ((0.2, BEFORE, "before"), (-0.2, AFTER, "after")):
-        sizes = [_rms(v) for *_, each in forces if (v := getattr(each, part)) is not None]
+        sizes = [rms(v) for *_, each in forces if (v := getattr(each, part)) is not None]
         if sizes:
             bars = panel.barh(at + shift, sizes, 0.38, color=color)
             panel.bar_label(bars, [figure(each) for each in sizes], padding=2, fontsize="small")
@@ -95,7 +96,3 @@ def _by_trial(panel: Axes, forces: list[tuple[str, Array, LatentForce]]) -> None
     panel.margins(x=0.15)
     panel.grid(visible=False, axis="y")
     panel.set_xlabel(f"{forces[0][2].quantity}, rms")
-
-
-def _rms(values: Array) -> float:
-    return float(np.sqrt(np.mean(values**2)))
