@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from pma_gym.data.trial import MEASUREMENTS
 from pma_gym.data.trial_columns import BY_QUANTITY
 from pma_gym.discovery.fitting.free_parameters import values
-from pma_gym.discovery.result.misfit import Gap, TrialRecord
+from pma_gym.discovery.result.misfit import Gap, TrialRecord, rms
 from pma_gym.discovery.result.noise import Floor, Judgement
 from pma_gym.discovery.verdict.findings import Findings
 from pma_gym.estimation.logged import Logged
@@ -149,8 +149,3 @@ def _zeroed(logged: Logged, held: Array, measured: Array) -> Array:
         if signal.has_free_zero and np.isfinite(off).any():
             curve[channel] += np.nanmean(off)
     return curve
-
-
-def rms(off: Array) -> float:
-    """Root mean square, of what is there."""
-    return float(np.sqrt(np.nanmean(off**2)))

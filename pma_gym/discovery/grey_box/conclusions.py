@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from pma_gym.data.datasets.dataset import NamedTrial
 from pma_gym.data.trial_columns import BY_QUANTITY
-from pma_gym.discovery.answer.trial_records import gaps, rms
+from pma_gym.discovery.answer.trial_records import gaps
 from pma_gym.discovery.diagnosis import Verdict
 from pma_gym.discovery.grey_box.effect_selection import EffectSelection
 from pma_gym.discovery.grey_box.latent_law import latent_force, latent_law, latent_line
@@ -19,7 +19,7 @@ from pma_gym.discovery.grey_box.sizes import estimate, named_effects
 from pma_gym.discovery.grey_box.slots import path_of, quantity_of, slot, with_numbers
 from pma_gym.discovery.grey_box.thresholds import COMPLETE, LEFT, MATERIAL, NOISES
 from pma_gym.discovery.result.estimates import Moved, NamedEffect, TrialState
-from pma_gym.discovery.result.misfit import Gap, ResidualLaw, TrialRecord
+from pma_gym.discovery.result.misfit import Gap, ResidualLaw, TrialRecord, rms
 from pma_gym.effects import CATALOGUE
 from pma_gym.estimation.innovations import TREND, TRIAL
 from pma_gym.estimation.likelihood_fit import value_of

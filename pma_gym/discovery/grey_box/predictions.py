@@ -7,11 +7,11 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from pma_gym.discovery.answer.trial_records import rms
 from pma_gym.discovery.grey_box.hypothesis import Hypothesis
 from pma_gym.discovery.grey_box.kept_fits import fit
 from pma_gym.discovery.grey_box.prepared_trials import PreparedTrials
 from pma_gym.discovery.grey_box.thresholds import HORIZON, HORIZON_S
+from pma_gym.discovery.result.misfit import rms
 from pma_gym.estimation.innovations import TRIAL, GreyBox, counted, predictions
 from pma_gym.estimation.likelihood_fit import value_of, with_tied, with_values
 

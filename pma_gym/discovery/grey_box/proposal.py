@@ -7,7 +7,6 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from pma_gym.discovery.answer.trial_records import rms
 from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
 from pma_gym.discovery.grey_box.effect_selection import EffectSelection
 from pma_gym.discovery.grey_box.first_fit import hold_fits
@@ -24,6 +23,7 @@ from pma_gym.discovery.grey_box.thresholds import (
     SMALL,
     SURE,
 )
+from pma_gym.discovery.result.misfit import rms
 from pma_gym.estimation.likelihood_fit import value_of, with_tied, with_values
 
 Array = NDArray[np.float64]

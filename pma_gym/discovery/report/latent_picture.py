@@ -8,11 +8,10 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
-from pma_gym.discovery.answer.trial_records import rms
 from pma_gym.discovery.diagnosis import Diagnosis
 from pma_gym.discovery.report.figure_text import figure
 from pma_gym.discovery.report.pictures import AFTER, PARAMETERS, after_name
-from pma_gym.discovery.result.misfit import LatentForce, ResidualLaw
+from pma_gym.discovery.result.misfit import LatentForce, ResidualLaw, rms
 from pma_gym.pages.figures import legend_below, picture, png
 
 Array = NDArray[np.float64]

@@ -161,3 +161,8 @@ class Map:
     x_edges: Array
     y_edges: Array
     residual: Array
+
+
+def rms(off: Array) -> float:
+    """Root mean square, of what is there."""
+    return float(np.sqrt(np.nanmean(off**2)))
