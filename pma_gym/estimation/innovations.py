@@ -202,11 +202,12 @@ class Rows:
         self._motor, self._at = np.asarray(logged.motor, float), np.asarray(logged.time, float)
         between = np.diff(self._at)
         rise = np.diff(self._motor) / between if linear else np.zeros(len(between))
-        self._slopes = np.append(rise, 0.0)
+        self._slopes = rise if linear else None
         held = self._motor[:-1] * between + 0.5 * rise * between**2
         self._sums = np.concatenate([[0.0], np.cumsum(held)])
-        edges = self.time[:-1, None] + spans[:, None] * (np.arange(steps + 1) / steps)
-        self._from, self._to = edges[:, :-1], edges[:, 1:]
+        edges = self.time[:-1, None] + spans[:, None] * (np.arange(steps) / steps)
+        self._edges = np.append(edges, self.time[-1])
+        self._widths = np.diff(self._edges)
         self._known: dict[float, Array] = {}
         self._starts: dict[tuple[int | None, int | None], tuple[float, float, float]] = {}
 
@@ -219,8 +220,9 @@ class Rows:
         """Mean command over each step, late by a delay; shape (rows, steps)."""
         known = self._known.get(delay)
         if known is None:
-            first, last = (self._integral(edge - delay) for edge in (self._from, self._to))
-            mean = (last - first) / (self._to - self._from)
+            mean = (np.diff(self._integral(self._edges - delay)) / self._widths).reshape(
+                -1, self.steps
+            )
             known = np.concatenate([np.full((1, self.steps), self.first), mean])
             if len(self._known) > MOST_KEPT:
                 self._known.clear()
@@ -229,12 +231,13 @@ class Rows:
 
     def _integral(self, at: Array) -> Array:
         """Integral of the command up to given times; before the first row it is as there."""
-        place = np.interp(at, self._at, np.arange(len(self._at))).astype(int)
-        beyond = at - self._at[place]
-        return (
-            self._sums[place]
-            + (self._motor[place] + 0.5 * self._slopes[place] * np.maximum(beyond, 0.0)) * beyond
-        )
+        early = self.first * np.minimum(at - self._at[0], 0.0)
+        if self._slopes is None:
+            return early + np.interp(at, self._at, self._sums)
+        place = np.clip(np.searchsorted(self._at, at, "right") - 1, 0, len(self._slopes) - 1)
+        beyond = np.clip(at - self._at[place], 0.0, None)
+        rest = (self._motor[place] + 0.5 * self._slopes[place] * beyond) * beyond
+        return early + self._sums[place] + rest
 
     def begin(self, position: int | None, speed: int | None) -> tuple[float, float, float]:
         """First position and speed, with the speed's standard deviation, from the first rows."""
