@@ -18,6 +18,7 @@ from pma_gym.effects.effect import Effect
 from pma_gym.effects.ports import SENSOR_DELAY
 from pma_gym.effects.slide.coulomb_friction import friction_path
 from pma_gym.estimation.logged import Logged
+from pma_gym.estimation.turns import turning
 from pma_gym.integrator.filter_kernel import FilterEquations, parameter_slots, write_filter
 from pma_gym.plant.composition import PlantEquations
 from pma_gym.plant.model import Model
@@ -120,7 +121,7 @@ def kernel(model: Model, channels: Sequence[int], keeps: bool = False) -> Kernel
             return module
 
         library = compiled(key, build, f"filter of {model.name}", brief=True)
-        call = library.function("innovations", [ctypes.c_int64] * 2 + [ctypes.c_void_p] * 7)
+        call = library.function("innovations", [ctypes.c_int64] + [ctypes.c_void_p] * 8)
         states = tuple(state.name for state in made.states)
         _kernels[key] = Kernel(call, tuple(parameter_slots(made, keeps)), states, width)
     return _kernels[key]
@@ -162,6 +163,8 @@ class Rows:
             hundreds of them would outweigh all that moves.
         extrapolated: whether a filter runs with twice the steps too, and what comes out is
             extrapolated to none.
+        noise: of each signal's readings, where steps in which the motion may turn are divided into
+            `TURNS` each.
     """
 
     def __init__(
@@ -174,9 +177,8 @@ class Rows:
         stride: int = 1,
         coarse: Sequence[bool] = (),
         extrapolated: bool = False,
+        noise: Sequence[float] = (),
     ) -> None:
-        finer = logged, channels, 2 * steps, linear, block, stride, coarse
-        self.finer = Rows(*finer) if extrapolated else None
         self.steps = steps
         starts = np.arange(0, len(logged.time), block)
         self.sizes = np.diff(np.append(starts, len(logged.time)))
@@ -197,19 +199,34 @@ class Rows:
             dwells = np.diff(self.readings[:, i, 0]) == 0.0
             self.readings[1:-1, i, 1] *= ~(dwells[1:] & dwells[:-1])
         self.there = self.readings[:, :, 1] > 0
-        spans = np.diff(self.time)
-        self.lengths = np.concatenate([[0.0], spans / steps])
         self._motor, self._at = np.asarray(logged.motor, float), np.asarray(logged.time, float)
         between = np.diff(self._at)
         rise = np.diff(self._motor) / between if linear else np.zeros(len(between))
         self._slopes = rise if linear else None
         held = self._motor[:-1] * between + 0.5 * rise * between**2
         self._sums = np.concatenate([[0.0], np.cumsum(held)])
-        edges = self.time[:-1, None] + spans[:, None] * (np.arange(steps) / steps)
-        self._edges = np.append(edges, self.time[-1])
-        self._widths = np.diff(self._edges)
-        self._known: dict[float, Array] = {}
         self._starts: dict[tuple[int | None, int | None], tuple[float, float, float]] = {}
+        shares = np.arange(steps) / steps
+        spans = np.diff(self.time)[:, None]
+        edges = np.append(self.time[:-1, None] + spans * shares, self.time[-1])
+        counts = np.ones(len(edges) - 1, int)
+        if len(noise):
+            shown = np.where(logged.counts[channels[0]] > 0, logged.measured[channels[0]], np.nan)
+            turns = turning(self._at, shown, noise[0] * block**0.5, channels[0] > 0) * between
+            passed = np.interp(edges, self._at, np.concatenate([[0.0], np.cumsum(turns)]))
+            counts[np.diff(passed) > 0.0] = TURNS
+        per_row = counts.reshape(-1, steps).sum(axis=1)
+        self._stepped(np.concatenate([[0, 0], np.cumsum(per_row)]), divided(edges, counts))
+        self.finer: Rows | None = None
+        if extrapolated:
+            finer = copy(self)
+            finer._stepped(2 * self.firsts, divided(self._edges, np.full(len(self.lengths), 2)))
+            self.finer = finer
+
+    def _stepped(self, firsts: NDArray[np.int64], edges: Array) -> None:
+        """Take steps: numbers of the first that lead to each row, and the times between them."""
+        self.firsts, self._edges, self.lengths = firsts, edges, np.diff(edges)
+        self._known: dict[float, Array] = {}
 
     @property
     def first(self) -> float:
@@ -217,25 +234,28 @@ class Rows:
         return float(self._motor[0])
 
     def commands(self, delay: float) -> Array:
-        """Mean command over each step, late by a delay; shape (rows, steps)."""
+        """Mean command over each step, late by a delay; shape (steps of all rows,)."""
         known = self._known.get(delay)
         if known is None:
-            mean = (np.diff(self._integral(self._edges - delay)) / self._widths).reshape(
-                -1, self.steps
-            )
-            known = np.concatenate([np.full((1, self.steps), self.first), mean])
+            known = np.diff(self._integral(self._edges - delay)) / self.lengths
             if len(self._known) > MOST_KEPT:
                 self._known.clear()
             self._known[delay] = known
         return known
+
+    def mean_commands(self, delay: float) -> Array:
+        """Mean command between each row and the one before it, late by a delay; shape (rows,)."""
+        means = np.diff(self._integral(self.time - delay)) / np.diff(self.time)
+        return np.append(self.first, means)
 
     def _integral(self, at: Array) -> Array:
         """Integral of the command up to given times; before the first row it is as there."""
         early = self.first * np.minimum(at - self._at[0], 0.0)
         if self._slopes is None:
             return early + np.interp(at, self._at, self._sums)
-        place = np.clip(np.searchsorted(self._at, at, "right") - 1, 0, len(self._slopes) - 1)
-        beyond = np.clip(at - self._at[place], 0.0, None)
+        rows = np.interp(at, self._at, np.arange(len(self._at)))
+        place = np.minimum(rows.astype(int), len(self._slopes) - 1)
+        beyond = np.maximum(at - self._at[place], 0.0)
         rest = (self._motor[place] + 0.5 * self._slopes[place] * beyond) * beyond
         return early + self._sums[place] + rest
 
@@ -258,6 +278,17 @@ class Rows:
             y = readings[there, speed, 0]
             motion, spread = float(y[0]), float(np.std(y)) + 1e-12
         return first, motion, spread
+
+
+TURNS = 8
+"""Steps that a step is divided into in which the motion may turn."""
+
+
+def divided(edges: Array, counts: NDArray[np.int64]) -> Array:
+    """Edges of steps (s) of which each is divided evenly into so many."""
+    into = np.repeat(np.arange(len(counts)), counts)
+    shares = (np.arange(len(into)) - np.cumsum(counts)[into] + counts[into]) / counts[into]
+    return np.append(edges[into] + np.diff(edges)[into] * shares, edges[-1])
 
 
 MOST_KEPT = 32
@@ -321,9 +352,11 @@ class GreyBox:
             some = list(points[first : first + width])
             filled = some + [some[-1]] * (width - len(some))
             trial = trials[number]
-            out = self._run(self.kernel, number, trial, filled)
+            given = self._given(self.kernel, number, trial, filled)
+            delays = [point.delay for point in filled]
+            out = self._run(self.kernel, trial, delays, given)
             if trial.finer is not None:
-                out = _extrapolated(out, self._run(self.kernel, number, trial.finer, filled))
+                out = _extrapolated(out, self._run(self.kernel, trial.finer, delays, given))
             for i, into in enumerate(results[number]):
                 into[first : first + width] = np.moveaxis(out[:, :, i, : len(some)], -1, 0)
 
@@ -337,7 +370,7 @@ class GreyBox:
         k = kernel(self.model, self.channels, keeps=True)
         n, s, trial = len(k.states), k.size, self.rows[number].finer or self.rows[number]
         room = np.empty((len(trial.time), 2 * s + n * n))
-        self._run(k, number, trial, [point], room)
+        self._run(k, trial, [point.delay], self._given(k, number, trial, [point]), room)
         lower = np.tril_indices(n)
 
         def full(flat: Array) -> Array:
@@ -355,24 +388,30 @@ class GreyBox:
             transition,
         )
 
+    def _given(
+        self, k: Kernel, number: int, trial: Rows, points: Sequence[Point]
+    ) -> tuple[Array, Array]:
+        """Parameters (slots, points), and means and covariances at the first row, of a trial."""
+        parameters = [self._vector(point, k.slots, number) for point in points]
+        starts = [self._start(trial, point, number, k.states) for point in points]
+        return np.array(parameters).T.copy(), np.array(starts).T.copy()
+
     def _run(
         self,
         k: Kernel,
-        number: int,
         trial: Rows,
-        points: Sequence[Point],
+        delays: Sequence[float],
+        given: tuple[Array, Array],
         kept: Array | None = None,
     ) -> Array:
-        commands = np.stack([trial.commands(point.delay) for point in points], axis=-1)
-        parameters = np.stack([self._vector(point, k.slots, number) for point in points], axis=-1)
-        start = np.stack([self._start(trial, point, number, k.states) for point in points], axis=-1)
-        out = np.empty((len(trial.time), len(self.channels), 2, len(points)))
+        commands = np.array([trial.commands(delay) for delay in delays]).T
+        out = np.empty((len(trial.time), len(self.channels), 2, len(delays)))
         arrays = [
             np.ascontiguousarray(a)
-            for a in (trial.lengths, commands, trial.readings, parameters, start)
+            for a in (trial.firsts, trial.lengths, commands, trial.readings, *given)
         ]
         addresses = [a.ctypes.data for a in (*arrays, out)]
-        k.call(len(trial.time), trial.steps, *addresses, 0 if kept is None else kept.ctypes.data)
+        k.call(len(trial.time), *addresses, 0 if kept is None else kept.ctypes.data)
         return out
 
     def _vector(self, point: Point, slots: Sequence[str], number: int) -> Array:

@@ -105,6 +105,7 @@ class Fit:
         tied: slots that follow another slot.
         information: expected information, shape (p, p), in the coordinates' units.
         scores: of each block of readings, shape (blocks, p).
+        shifts: by which coarser integration moves each coordinate, shape (p,), or none.
     """
 
     point: Point
@@ -113,6 +114,7 @@ class Fit:
     tied: Mapping[str, str]
     information: Array
     scores: Array
+    shifts: Array | float = 0.0
 
     @cached_property
     def curvature(self) -> Array:
@@ -121,11 +123,14 @@ class Fit:
 
     @cached_property
     def deviations(self) -> dict[str, float]:
-        """Standard errors (SI) by name, by the sandwich of information and scores."""
+        """Standard errors (SI) by name, by the sandwich of information and scores.
+
+        With what integration moves, as another error.
+        """
         bread = self.curvature
         meat = self.scores.T @ self.scores
         wide = np.maximum(np.diag(bread @ meat @ bread), np.diag(bread))
-        errors = np.sqrt(np.maximum(wide, 0.0))
+        errors = np.sqrt(np.maximum(wide, 0.0) + np.square(self.shifts))
         sizes = [
             value_of(self.point, c.name) if c.logarithmic else c.scale for c in self.coordinates
         ]
@@ -133,6 +138,12 @@ class Fit:
             c.name: float(e * abs(s))
             for c, e, s in zip(self.coordinates, errors, sizes, strict=True)
         }
+
+    def moved_from(self, coarser: "Fit") -> "Fit":
+        """With what parts it from a fit of the same by coarser integration as an error."""
+        known = {c.name for c in coarser.coordinates}
+        points = [(c, coarser.point if c.name in known else self.point) for c in self.coordinates]
+        return replace(self, shifts=np.array([c.of(self.point) - c.of(p) for c, p in points]))
 
     def moved(self, name: str, x: float) -> Point:
         """The point with one coordinate elsewhere."""

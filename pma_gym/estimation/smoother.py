@@ -59,7 +59,7 @@ def smoothed(box: GreyBox, point: Point, number: int) -> Smoothed:
     at = {name: i for i, name in enumerate(kept.states)}
     latent, position = at[f"memory_{LATENT}"], at[box.model.rig.signals[0].name]
     deviation = np.sqrt(np.maximum(spread[:, latent, latent], 0.0))
-    command = trial.commands(point.delay).mean(axis=1)
+    command = trial.mean_commands(point.delay)
     return Smoothed(
         trial.time,
         mean[:, latent],

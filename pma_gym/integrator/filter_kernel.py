@@ -269,13 +269,14 @@ def _minus(a: Entry) -> Entry:
     return None if a is None else -a
 
 
-ARGUMENTS = ("times", "commands", "readings", "parameters", "start", "out", "kept")
-"""Addresses that the function takes, after the numbers of rows and of steps a row.
+ARGUMENTS = ("firsts", "times", "commands", "readings", "parameters", "start", "out", "kept")
+"""Addresses that the function takes, after the number of rows.
 
-times: length of a step before each row, (rows,); commands: [row, step, lane]; readings: [row,
-    sensor, (reading, counts)]; parameters: [slot, lane]; start: [state and covariance, lane]; out:
-    [row, sensor, (reading less what was expected, variance), lane]; kept: per row the predicted
-    mean and covariance, the corrected ones and the transition from the row before, one lane.
+firsts: number of the first step that leads to each row, (rows + 1,), integers; times: length of
+    each step, (steps,); commands: [step, lane]; readings: [row, sensor, (reading, counts)];
+    parameters: [slot, lane]; start: [state and covariance, lane]; out: [row, sensor, (reading less
+    what was expected, variance), lane]; kept: per row the predicted mean and covariance, the
+    corrected ones and the transition from the row before, one lane.
 """
 
 
@@ -299,12 +300,10 @@ def write_filter(module: Module, made: FilterEquations, width: int, keeps: bool)
     """Write the function `innovations`; `keeps` for one lane that keeps what a smoother needs."""
     eq, n = made.eq, len(made.mean)
     simd = SimdEmitter(width, fused=True)
-    b, (rows, steps, *pointers) = function(
-        module,
-        "innovations",
-        [("rows", INTEGER), ("steps", INTEGER), *((name, POINTER) for name in ARGUMENTS)],
+    b, (rows, *pointers) = function(
+        module, "innovations", [("rows", INTEGER), *((name, POINTER) for name in ARGUMENTS)]
     )
-    times, commands, readings, parameters, start, out, kept = pointers
+    firsts, times, commands, readings, parameters, start, out, kept = pointers
     everything = _everything(made, keeps)
     transition = everything[len(made.step) + len(made.correction) :]
     fixed, inputs = split(everything, FIXED), _fixed_inputs(everything)
@@ -335,12 +334,13 @@ def write_filter(module: Module, made: FilterEquations, width: int, keeps: bool)
         if keeps:
             for i in range(n * n):
                 simd.store(b, simd.constant(float(i % (n + 1) == 0)), phi, i)
-        moves = b.select(b.icmp_signed(">", row, integer(0)), steps, integer(0))
-        length = simd.spread(b, b.load(offset(b, times, row), typ=simd.element))
-        with loop(b, moves) as s:
+        ends = (row, b.add(row, integer(1)))
+        first, end = (b.load(offset(b, firsts, at, INTEGER), typ=INTEGER) for at in ends)
+        with loop(b, end, first) as step:
             known = load()
-            known[made.length.id] = length
-            known[eq[COMMANDS[0]].id] = simd.load(b, commands, b.add(b.mul(row, steps), s))
+            length = b.load(offset(b, times, step), typ=simd.element)
+            known[made.length.id] = simd.spread(b, length)
+            known[eq[COMMANDS[0]].id] = simd.load(b, commands, step)
             emitted = simd.emit(b, [*made.step, *transition], known)
             for i, value in enumerate(made.step):
                 simd.store(b, emitted[value.id], state, i)

@@ -124,14 +124,14 @@ def _begin(
 
 
 def hold_fits(
-    trials: PreparedTrials, best: Fit, model: Model, linear: bool, steps: int
+    trials: PreparedTrials, best: Fit, model: Model, linear: bool, steps: int, fine: bool = False
 ) -> list[Fit]:
     """Fits with commands held or linear between rows, from a fit that has them either way.
 
     A held command is a line half a row later. Friction that begins to slip too late hides
     which it is, so that both begin a second time with a tenth of the presliding distance.
     """
-    box, point = trials.box(model, linear, steps), best.point
+    box, point = trials.box(model, linear, steps, fine), best.point
     row = 0.5 * trials.span / trials.stride / trials.block * (int(linear) - int(trials.linear))
     late = any(c.name == "delay" for c in best.coordinates)
     fits = []

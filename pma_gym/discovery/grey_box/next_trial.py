@@ -26,12 +26,12 @@ from pma_gym.discovery.experiments.predicted_trials import proposal
 from pma_gym.discovery.grey_box.conclusions import Conclusions
 from pma_gym.discovery.grey_box.effect_fits import tried
 from pma_gym.discovery.grey_box.hypothesis import Hypothesis
-from pma_gym.discovery.grey_box.prepared_trials import PreparedTrials
+from pma_gym.discovery.grey_box.prepared_trials import PreparedTrials, is_rough
 from pma_gym.discovery.grey_box.thresholds import LIKE
 from pma_gym.discovery.report.effect_text import effect_names
 from pma_gym.discovery.report.figure_text import figure, signal_name
 from pma_gym.discovery.result.next_experiment import NextExperiment
-from pma_gym.estimation.innovations import TREND, TRIAL, GreyBox, Point, Rows, counted
+from pma_gym.estimation.innovations import TREND, TRIAL, TURNS, GreyBox, Point, Rows, counted
 from pma_gym.estimation.likelihood_fit import STEP, with_tied, with_values
 from pma_gym.estimation.logged import Logged
 from pma_gym.plant.sensors import direct_command
@@ -176,8 +176,9 @@ class Question:
         logged = Logged.of(self.trials.model, 0, replace(trial, measurements=still))
         runs, predicted = [], []
         for rival in self.rivals:
-            options = rival.box.rows[0].steps, self.trials.linear, 1
-            rows = Rows(logged, self.trials.channels, *options)
+            # Where a motion turns that nobody has seen is not known: all steps are divided.
+            steps = rival.box.rows[0].steps * (TURNS if is_rough(rival.box.model) else 1)
+            rows = Rows(logged, self.trials.channels, steps, self.trials.linear, 1)
             box = GreyBox(rival.box.model, [rows], rival.box.channels, rival.box.threads)
             unread = counted(rows, np.zeros(len(rows.time), bool))
             ((errors, _),) = box.innovations([_alone(rival.fit.point)], [unread])

@@ -23,6 +23,9 @@ steps of all trials together at most, and the shortest step: where friction turn
 enough for such precision.
 """
 
+FINEST_STEPS = 400_000
+"""Steps of all trials together at most where sizes are fitted once more, with fine steps."""
+
 MOST_ROWS = 8_000
 """Of all trials together.
 
@@ -81,7 +84,7 @@ class PreparedTrials:
         longest = max(float(each.time[-1] - each.time[0]) for each in logged)
         self.memory = 4.0 * self.span, max(longest / 5.0, 8.0 * self.span)
         self.noise = [n / self.block**0.5 for n in self.noise]
-        self._rows: dict[tuple[int, bool, bool], list[Rows]] = {}
+        self._rows: dict[tuple[int, bool, bool, bool], list[Rows]] = {}
         self.force = self._force()
 
     def _block(self, readings: Sequence[Sequence[Array]]) -> int:
@@ -112,19 +115,32 @@ class PreparedTrials:
             forces.append(drive.law(*(at[name] for name in signals(drive.law))))
         return abs(forces[0] - forces[1]) or 1.0
 
-    def box(self, model: Model, linear: bool | None = None, steps: int = 0) -> GreyBox:
-        """The filter of a model over the trials, with so many integration steps a row."""
+    def box(
+        self, model: Model, linear: bool | None = None, steps: int = 0, fine: bool = False
+    ) -> GreyBox:
+        """The filter of a model over the trials, with so many integration steps a row.
+
+        Where friction turns nothing is smooth, and extrapolation would only make more of it, unless
+        steps are fine there.
+        """
         steps = steps or self.steps
         linear = self.linear if linear is None else linear
-        # Where friction turns nothing is smooth: extrapolation would only make more of it.
-        key = steps, linear, not is_rough(model)
+        key = steps, linear, is_rough(model), fine
         if key not in self._rows:
-            how = self.channels, steps, linear, self.block, self.stride, self.coarse, key[2]
-            self._rows[key] = [Rows(each, *how) for each in self.logged]
+            how = self.channels, steps, linear, self.block, self.stride, self.coarse
+            noise = self.noise if is_rough(model) and fine else ()
+            self._rows[key] = [
+                Rows(each, *how, fine or not is_rough(model), noise) for each in self.logged
+            ]
         return GreyBox(model, self._rows[key], self.channels, self.threads)
 
     def precise(
-        self, model: Model, point: Point, steps: int = 0, linear: bool | None = None
+        self,
+        model: Model,
+        point: Point,
+        steps: int = 0,
+        linear: bool | None = None,
+        fine: bool = False,
     ) -> GreyBox:
         """The filter of a model with as many steps as it needs at a point, at least so many.
 
@@ -132,14 +148,16 @@ class PreparedTrials:
         """
         rows, steps = self.stride * self.block, steps or self.steps
         point = replace(point, forces=(LEAST_FORCE * self.force,) * len(self.logged))
-        total = sum(float(each.time[-1] - each.time[0]) for each in self.logged)
-        most = min(MOST_STEPS * self.span / total, self.span / SHORTEST_S)
-        box = self.box(model, linear, steps)
+        shortest, most = (0.0, FINEST_STEPS) if fine else (SHORTEST_S, MOST_STEPS)
+        box = self.box(model, linear, steps, fine)
         white = self.white(box, [point])
-        while 2 * steps <= most:
+        while (
+            2 * steps * shortest <= self.span
+            and 2 * sum(each.firsts[-1] for each in box.rows) <= most
+        ):
             # Where several rows are one step, the next has each by itself.
             steps = rows if steps < rows < 2 * steps else 2 * steps
-            finer = self.box(model, linear, steps)
+            finer = self.box(model, linear, steps, fine)
             before, white = white, self.white(finer, [point])
             if np.sum((white - before) ** 2) < PRECISE:
                 break

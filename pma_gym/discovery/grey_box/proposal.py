@@ -14,6 +14,7 @@ from pma_gym.discovery.grey_box.hypothesis import Hypothesis, Move
 from pma_gym.discovery.grey_box.kept_fits import fit
 from pma_gym.discovery.grey_box.predictions import Predictions
 from pma_gym.discovery.grey_box.prepared_trials import LEAST_FORCE
+from pma_gym.discovery.grey_box.refined_fits import finest
 from pma_gym.discovery.grey_box.slots import gains_of_drive, quantity_of, slot
 from pma_gym.discovery.grey_box.thresholds import (
     COMPLETE,
@@ -46,11 +47,13 @@ class Proposal:
     @cached_property
     def last(self) -> Hypothesis:
         """The hypothesis that is proposed, without a delay that is not worth its price."""
-        chosen = self._chosen
+        chosen = finest(self.selection.trials, self._chosen)
         prompt = [c for c in chosen.fit.coordinates if c.name != "delay"]
         made = fit(chosen.box, replace(chosen.fit.point, delay=0.0), prompt, chosen.fit.tied)
         least = chosen.fit.value - chosen.price_of(1) - LIKE
-        return replace(chosen, fit=made) if made.value > least else chosen
+        if made.value > least:
+            chosen = replace(chosen, fit=made)
+        return replace(chosen, fit=chosen.fit.moved_from(self._chosen.fit))
 
     @cached_property
     def _chosen(self) -> Hypothesis:
@@ -142,9 +145,8 @@ class Proposal:
         prompt = tuple(c for c in last.fit.coordinates if c.name != "delay")
         start = replace(last.fit, point=replace(last.fit.point, delay=0.0), coordinates=prompt)
         for linear in (False, True):
-            made = hold_fits(
-                self.selection.trials, start, last.box.model, linear, last.box.rows[0].steps
-            )
+            steps = last.box.rows[0].steps
+            made = hold_fits(self.selection.trials, start, last.box.model, linear, steps, fine=True)
             values += [each.value for each in made]
         return max(values)
 

@@ -10,7 +10,7 @@ from pma_gym.discovery.grey_box.effect_fits import tried, weaker
 from pma_gym.discovery.grey_box.first_fit import hold_fits
 from pma_gym.discovery.grey_box.hypothesis import Hypothesis, Move
 from pma_gym.discovery.grey_box.kept_fits import fit
-from pma_gym.discovery.grey_box.prepared_trials import PreparedTrials
+from pma_gym.discovery.grey_box.prepared_trials import PreparedTrials, is_rough
 from pma_gym.discovery.grey_box.slots import quantity_of, slot, values_of
 from pma_gym.discovery.grey_box.thresholds import LIKE, LINE
 from pma_gym.effects import CATALOGUE
@@ -19,6 +19,10 @@ from pma_gym.estimation.likelihood_fit import Coordinate, value_of, with_tied, w
 
 WIDER = (1.0, 0.2, 5.0)
 """Times the usual shape (a Stribeck speed) from which the fuller law of an effect is fitted."""
+
+
+COARSER, LESS_SLIP = 4, (1.0, 0.1)
+"""Of the last fits: share of the former steps that they begin with, times the presliding."""
 
 
 def refined(trials: PreparedTrials, now: Hypothesis) -> Hypothesis:
@@ -110,3 +114,22 @@ def again(now: Hypothesis, larger: Hypothesis) -> Hypothesis:
     start = with_values(now.fit.point, with_tied(values, now.fit.tied))
     made = fit(now.box, start, now.fit.coordinates, now.fit.tied)
     return replace(now, fit=max(made, now.fit, key=lambda each: each.value))
+
+
+def finest(trials: PreparedTrials, now: Hypothesis) -> Hypothesis:
+    """A hypothesis with dry friction, fitted once more with steps that are fine where it turns.
+
+    Also from a tenth of the presliding distance: coarse steps want it larger than it is.
+    """
+    if not is_rough(now.box.model):
+        return now
+    box = trials.precise(
+        now.box.model, now.fit.point, max(1, now.box.rows[0].steps // COARSER), fine=True
+    )
+    slips = {n: v for n, v in now.fit.point.numbers.items() if n.endswith(".presliding")}
+    starts = [
+        with_values(now.fit.point, {n: v * less for n, v in slips.items()}) for less in LESS_SLIP
+    ]
+    fits = [fit(box, start, now.fit.coordinates, now.fit.tied, rough=True) for start in starts]
+    best = max(fits, key=lambda each: each.value)
+    return replace(now, box=box, fit=fit(box, best.point, best.coordinates, best.tied))

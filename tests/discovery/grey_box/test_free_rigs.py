@@ -167,7 +167,7 @@ def test_a_drive_that_weakens_from_trial_to_trial_is_said_with_its_size():
     for force, share in zip(forces, (-0.02, 0.0, 0.02), strict=True):
         load = 100.0 * (force.over["motor voltage (V)"] - 5.0)
         assert np.polyfit(load, force.before, 1)[0] == pytest.approx(share, abs=0.003)
-        assert np.std(force.after) < 0.001 * np.std(load)
+        assert np.std(force.after) < 0.002 * np.std(load)
 
 
 @pytest.mark.campaign
