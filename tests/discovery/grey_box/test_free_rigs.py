@@ -185,13 +185,8 @@ def test_dry_friction_that_the_model_lacks_is_named_with_its_size(plant):
 class Uneven(lab.Laboratory):
     """A case of the lab whose dry friction grows by half over half of the stroke."""
 
-    @property
-    def slope(self):
-        """Of its friction (1/m, 1/rad)."""
-        return 0.5 / self.campaign.rig.travel
-
     def effects(self, i):
-        return (PositionFriction(self.friction, self.slope),)
+        return (PositionFriction(self.friction, 0.5 / self.campaign.rig.travel),)
 
 
 @pytest.mark.campaign
@@ -207,7 +202,7 @@ def test_friction_that_grows_along_the_stroke_is_named_with_its_slope(seed, numb
     assert diagnosis.verdict == "effect", diagnosis.sentence
     assert [effect.name for effect in diagnosis.effects] == [name], diagnosis.sentence
     ((key, size),) = diagnosis.effects[0].parameters.items()
-    slope = CATALOGUE[name].quantities["slope"].from_si(hidden.slope)
+    slope = CATALOGUE[name].quantities["slope"].from_si(hidden.effects(0)[0].slope)
     assert size.low < slope < size.high, (key, size)
 
 
