@@ -14,6 +14,8 @@ from functools import cache
 SI_FACTORS: dict[str, float] = {
     "1": 1.0,
     "%": 0.01,
+    "%/mm": 10.0,
+    "%/deg": 1.8 / math.pi,
     "V": 1.0,
     "s": 1.0,
     "ms": 1e-3,

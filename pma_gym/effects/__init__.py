@@ -17,6 +17,10 @@ from pma_gym.effects.contact.load_dependent_friction import (
     LOAD_DEPENDENT_FRICTION,
 )
 from pma_gym.effects.contact.piston_force import PISTON_FORCE
+from pma_gym.effects.contact.position_friction import (
+    JOINT_POSITION_FRICTION,
+    POSITION_FRICTION,
+)
 from pma_gym.effects.contact.quadratic_drag import JOINT_DRAG, QUADRATIC_DRAG
 from pma_gym.effects.contact.spring import (
     HARDENING_SPRING,
@@ -174,6 +178,8 @@ CATALOGUE: dict[str, Effect] = {
         JOINT_HARDENING_SPRING,
         LOAD_DEPENDENT_FRICTION,
         JOINT_LOAD_FRICTION,
+        POSITION_FRICTION,
+        JOINT_POSITION_FRICTION,
         DIRECTIONAL_GAIN,
         CONSTANT_TORQUE,
         INERTIA,

@@ -2,7 +2,7 @@
 
 A rig computes its signals one after the other, so a law reads those that are known at its port,
 and a rate law all of the rig. `tests/effects/test_user_effects.py` checks these tables against the
-rigs. The zero of a slide's position is free in every trial, so no law reads it.
+rigs. The zero of a slide's position may differ by trial, so none reads it but that of dry friction.
 """
 
 from pma_gym.effects.effect import ANTAGONIST, Effect, antagonist, signals
@@ -25,6 +25,11 @@ _MOVED = ("position", "contraction", "velocity", "pressure")
 _DELAY, _LAG = ("load_asked", "motor_voltage"), ("load_command", "motor_voltage")
 
 SLIDE_PORTS: dict[str, Port] = {
+    "dry_friction": Port(
+        "factor on the level of dry friction, multiplied",
+        signals=("position", *_DRIVEN, "carried_force"),
+        absent=1.0,
+    ),
     "slide_force": Port(
         "force on the slide (N), added; positive in the direction of contraction",
         signals=(*_DRIVEN, "carried_force"),
@@ -77,6 +82,9 @@ JOINT_PORTS: dict[str, Port] = {
         "torque that the joint carries at rest (N m), added; positive likewise",
         signals=_TURNING,
         absent=0.0,
+    ),
+    "joint_dry_friction": Port(
+        "factor on the level of dry friction, multiplied", signals=_CARRYING, absent=1.0
     ),
     "joint_torque": Port(
         "torque on the joint (N m), added; positive as the angle grows",
@@ -156,7 +164,10 @@ SECOND_PORTS: tuple[str, ...] = (
 MUSCLE_JOINT_PORTS: dict[str, Port] = {
     **_MUSCLE_PORTS,
     "joint_drive": Port("torque of a drive or motor beside the muscle (N m)", most=1),
-    **{name: JOINT_PORTS[name] for name in ("joint_drive_loss", "joint_load", "joint_torque")},
+    **{
+        name: JOINT_PORTS[name]
+        for name in ("joint_drive_loss", "joint_load", "joint_dry_friction", "joint_torque")
+    },
     "supply": Port("gauge pressure of the tank (Pa)", most=1),
 }
 """Ports of a joint that a muscle turns, with the number of effects and the use of their results."""

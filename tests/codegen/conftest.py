@@ -28,6 +28,7 @@ SIGNALS = {
     "drive_force": (-50.0, 50.0),
     "carried_force": (-20.0, 20.0),
     "memory": (-1.0, 1.0),
+    "friction_factor": (0.5, 2.0),
     "travel": (-2e-5, 2e-5),
     "direction": (-1.0, 1.0),
     "stretch": (-1e-3, 3e-3),

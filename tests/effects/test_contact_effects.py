@@ -82,6 +82,42 @@ def test_friction_by_load_takes_a_share_of_the_drives_torque_or_of_what_is_carri
     assert slope == pytest.approx(left / INERTIA, rel=1e-3)
 
 
+@pytest.mark.parametrize("slope", [-8.0, 0.0, 8.0])
+@pytest.mark.parametrize("rig", ["slide", "joint"])
+def test_friction_over_position_takes_its_work_and_never_drives(rig, slope):
+    """A rig that coasts; falling friction ends on its way, without a slope rates keep every bit."""
+    make, start, friction, unit, command, place, speed, inertia = {
+        "slide": (
+            *(slide, {"start.velocity_mm_per_s": 300.0}, "coulomb_friction", 10.0),
+            *("load_command", "contraction", "velocity", 2.0),
+        ),
+        "joint": (
+            *(joint, {"joint_start.spin_deg_per_s": 1000.0}, "joint_friction", 1.8 / np.pi),
+            *("torque_command", "angle", "speed", INERTIA),
+        ),
+    }[rig]
+    dry = CATALOGUE[friction]
+    rubbing = dry.values_in_files(dry.usual._replace(static=4.0, dynamic=4.0, presliding=2e-7))
+    over = {"slide": "position_friction", "joint": "joint_position_friction"}[rig]
+    (key,) = CATALOGUE[over].names_in_files()
+    model = make(**{friction: rubbing, over: {key: slope}}).replace(start)
+    _, truth = held(model, command, 0.0)
+    # The level where it has not ended.
+    x, s = truth[place], unit * slope
+    end = np.minimum(x, -1.0 / s) if s < 0.0 else x
+    energy = 0.5 * inertia * truth[speed] ** 2
+    # Bristles store no more than their level over the distance in which they deflect.
+    stored = 4.0 * (1.0 + s * x).max() * 2e-7
+    work = 4.0 * (end + 0.5 * s * end**2)
+    np.testing.assert_allclose(energy + work, energy[0], rtol=1e-5, atol=3.0 * stored)
+    assert np.diff(energy).max() < stored
+    if not slope:
+        plants = Plant(model), Plant(make(**{friction: rubbing}))
+        states = np.random.default_rng(0).standard_normal((20, len(plants[0].states)))
+        rates, plain = (plant.derivative(states, 1.0, 0.0, 0.0) for plant in plants)
+        np.testing.assert_array_equal(rates, plain)
+
+
 TURNS = np.array([-10.0, -10.0, 3.0, 3.0, -7.0, 1.0, 1.0, -2.0, -2.0, 10.0])
 
 

@@ -45,7 +45,7 @@ def pushed(plant, when, force):
     names = ("contraction", "velocity", "memory_coulomb_friction")
     x, velocity, memory = (states[:, plant.states.index(name)] for name in names)
     p = plant.model.parameters["coulomb_friction"]
-    return x, velocity, -friction_force(velocity, memory, p), memory
+    return x, velocity, -friction_force(velocity, 1.0, memory, p), memory
 
 
 def test_below_the_static_force_it_holds_for_a_minute():

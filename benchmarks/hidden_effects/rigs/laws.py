@@ -84,6 +84,17 @@ class PressureFriction(HiddenEffect):
 
 
 @dataclass(frozen=True)
+class PositionFriction(HiddenEffect):
+    """Dry friction `size` at q = 0 that grows by `slope` of itself a metre or radian."""
+
+    slope: float = 0.0
+    name: ClassVar[str] = "position_friction"
+
+    def kinetic(self, q: float, v: float, u: float) -> float:  # noqa: D102
+        return self.size * max(1.0 + self.slope * q, 0.0)
+
+
+@dataclass(frozen=True)
 class Gravity(HiddenEffect):
     """m g l of a joint, which hangs at q = -angle."""
 

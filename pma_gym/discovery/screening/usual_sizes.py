@@ -50,6 +50,8 @@ DIMENSIONS: dict[str, tuple[int, int, int, int]] = {
     "mm/s": (0, 1, 0, 0),
     "deg/s": (0, 1, 0, 0),
     PERIODIC: (0, 0, -1, 0),
+    "%/mm": (0, 0, -1, 0),
+    "%/deg": (0, 0, -1, 0),
 }
 """Powers of force, speed, way and pressure in a unit, for those that scale with them."""
 
@@ -60,7 +62,8 @@ RESTS = (0.0, 1.0, -1.0, 4.0, -4.0)
 """Where a spring may be relaxed, over half of the trials' longest way."""
 
 RIPPLE = 4.0
-"""Periods of a force that is periodic in the position, over half of the trials' longest way."""
+"""Periods of a force that is periodic in the position, over half of the trials' longest way. The
+slope of a factor over the position is looked for at as much, over the same."""
 
 LEAST_PERIODS = 1.25
 """Least number of its periods over the longest way: a bump at an end of the way is part of a wave,

@@ -34,6 +34,8 @@ def constant_force(p):
         Force (N, N m); positive in the direction in which the position grows.
     Source:
         None needed. Logs in one direction of motion cannot distinguish it from dry friction.
+        Dry friction of F1 forwards and F2 backwards is dry friction of (F1 + F2) / 2 and a constant
+        force of (F2 - F1) / 2.
     """
     return p.force
 
@@ -43,12 +45,18 @@ CONSTANT_FORCE = Effect(
     port="contact_force",
     parameters=ConstantForce,
     law=constant_force,
-    signature="the same force at every position, speed, direction and pressure",
+    signature=(
+        "the same force at every position, speed, direction and pressure; beside dry friction, "
+        "friction that differs by direction"
+    ),
 )
 CONSTANT_TORQUE = Effect(
     name="constant_torque",
     port="joint_load",
     parameters=ConstantTorque,
     law=constant_force,
-    signature="the same torque at every angle, speed and direction",
+    signature=(
+        "the same torque at every angle, speed and direction; beside dry friction, friction that "
+        "differs by direction"
+    ),
 )

@@ -28,13 +28,14 @@ class CoulombFriction(NamedTuple):
     ]
 
 
-def friction_force(velocity, memory, p):
+def friction_force(velocity, friction_factor, memory, p):
     """Force of the bristles on the slide.
 
-        F = -f(v) z,   f(v) = dynamic + (static - dynamic) / (1 + (v / stribeck_speed)^2)
+        F = -k f(v) z,   f(v) = dynamic + (static - dynamic) / (1 + (v / stribeck_speed)^2)
 
     Args:
         velocity: rate of contraction v (m/s).
+        friction_factor: factor k on its level, as `position_friction` has it; else 1.
         memory: deflection z of the bristles, between -1 and 1.
         p: CoulombFriction: static, dynamic (N), stribeck_speed (m/s), presliding (m).
     Returns:
@@ -45,7 +46,8 @@ def friction_force(velocity, memory, p):
         the fall of the force with speed (Stribeck) multiplies it.
     """
     ratio = velocity / p.stribeck_speed
-    return -(p.dynamic + (p.static - p.dynamic) / (1.0 + ratio * ratio)) * memory
+    level = p.dynamic + (p.static - p.dynamic) / (1.0 + ratio * ratio)
+    return -level * friction_factor * memory
 
 
 def friction_path(memory, travel, direction, p):

@@ -37,6 +37,7 @@ def write_equations(equations: PlantEquations) -> None:
     eq.let("drive_force", eq.one("joint_drive"))
     eq.let("drive_force", eq["drive_force"] + eq.total("drive_gain"))
     eq.let("carried_force", eq.total("joint_load"))
+    eq.let("friction_factor", eq.product("joint_dry_friction"))
     torque = eq["drive_force"] + eq["carried_force"]
     torque = torque + eq.total("joint_drive_loss") + eq.total("joint_torque")
     eq.outputs = {"angle": eq["angle"], "speed": eq["spin"]}

@@ -60,6 +60,7 @@ def write_equations(equations: PlantEquations) -> None:
         torque = torque + side * eq.views[f"{prefix}muscle_force"]["arm"] * load
     eq.let("drive_force", torque)
     eq.let("carried_force", eq.total("joint_load"))
+    eq.let("friction_factor", eq.product("joint_dry_friction"))
     torque = torque + eq["carried_force"] + eq.total("joint_drive_loss") + eq.total("joint_torque")
     measured = [f"{prefix}{name}" for prefix in muscles for name in ("load", "pressure")]
     eq.outputs = {name: eq[name] for name in ("angle", *measured)}

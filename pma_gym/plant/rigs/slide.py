@@ -56,6 +56,7 @@ def write_equations(equations: PlantEquations) -> None:
     eq.let("drive_force", -eq["load_arriving"])
     eq.let("drive_force", eq["drive_force"] + eq.total("drive_gain"))
     eq.let("carried_force", eq.total("contact_force"))
+    eq.let("friction_factor", eq.product("dry_friction"))
     eq.let("slide_force", eq.total("slide_force") + eq["carried_force"])
     eq.let("resistance", eq.total("muscle_damping"))
     eq.outputs = {"contraction": eq["contraction"], "velocity": eq["velocity"]}

@@ -56,6 +56,7 @@ def write_equations(equations: PlantEquations) -> None:
     eq.let("stretch_rate", rotor.radius * eq["spin"] + eq["velocity"])
     eq.let("cable_tension", eq.one("cable"))
     eq.let("muscle_force", eq.total("muscle_force"))
+    eq.let("friction_factor", eq.graph.constant(1.0))
     eq.let("slide_force", eq.total("slide_force"))
     eq.let("resistance", eq.total("muscle_damping") * eq.product("damping_factor"))
     eq.outputs = {

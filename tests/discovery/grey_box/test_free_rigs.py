@@ -11,6 +11,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from benchmarks.hidden_effects.rigs import lab
+from benchmarks.hidden_effects.rigs.laws import PositionFriction
 from pma_gym import Plant
 from pma_gym.data.datasets.dataset import read_dataset
 from pma_gym.data.trial import Trial
@@ -178,6 +180,30 @@ def test_dry_friction_that_the_model_lacks_is_named_with_its_size(plant):
     assert sizes[DRY[plant]][SIZE[plant]].value == pytest.approx(RIGS[plant][2], rel=0.05)
     assert inertia_of(diagnosis, plant) == pytest.approx(1.0, rel=0.02)
     assert diagnosis.verdict == "effect" and set(sizes) == {DRY[plant]}, diagnosis.sentence
+
+
+class Uneven(lab.Laboratory):
+    """A case of the lab whose dry friction grows by half over half of the stroke."""
+
+    def effects(self, i):
+        return (PositionFriction(self.friction, 0.5 / self.campaign.rig.travel),)
+
+
+@pytest.mark.campaign
+@pytest.mark.parametrize(
+    ("seed", "number", "name"),
+    [(903, 5, "position_friction"), (902, 2, "joint_position_friction")],
+)
+def test_friction_that_grows_along_the_stroke_is_named_with_its_slope(seed, number, name, tmp_path):
+    hidden = Uneven(**vars(lab.laboratory(seed, number, "nothing")))
+    for file, text in hidden.texts().items():
+        (tmp_path / file).write_text(text, encoding="utf-8")
+    diagnosis = diagnose(read_dataset(tmp_path), tmp_path / "model.toml", propose=False)
+    assert diagnosis.verdict == "effect", diagnosis.sentence
+    assert [effect.name for effect in diagnosis.effects] == [name], diagnosis.sentence
+    ((key, size),) = diagnosis.effects[0].parameters.items()
+    slope = CATALOGUE[name].quantities["slope"].from_si(hidden.effects(0)[0].slope)
+    assert size.low < slope < size.high, (key, size)
 
 
 def test_a_rival_of_an_effect_is_written_with_its_fit():
