@@ -8,12 +8,10 @@ from numpy.typing import NDArray
 
 from pma_gym.data.signals import Signal
 from pma_gym.discovery.screening.time_bins import TimeBins
+from pma_gym.discovery.thresholds import LARGEST_REGION, SMALLEST_REGION
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
-
-SMALLEST, LARGEST = 0.02, 0.9
-"""Shares of a signal's readings between which a region is one."""
 
 
 @dataclass(frozen=True)
@@ -105,7 +103,7 @@ def single_regions(bins: TimeBins, levels: Sequence[Axis]) -> list[Region]:
     count = int(there.sum())
     kept = {}
     for kind, words, inside in named:
-        if SMALLEST * count <= inside.sum() <= LARGEST * count:
+        if SMALLEST_REGION * count <= inside.sum() <= LARGEST_REGION * count:
             # Of two ways to say the same, the first.
             kept.setdefault(inside.tobytes(), Region((kind,), words, inside))
     return list(kept.values())

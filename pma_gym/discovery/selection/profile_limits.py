@@ -10,13 +10,9 @@ from numpy.typing import NDArray
 from pma_gym.discovery.fitting.candidate_effect import CandidateEffect, bounds
 from pma_gym.discovery.fitting.fit_problem import FitProblem, Fitted
 from pma_gym.discovery.fitting.free_parameters import unit
+from pma_gym.discovery.thresholds import FAR_ABOVE, FAR_BELOW
 from pma_gym.estimation.logged import Logged
 from pma_gym.units import SI_FACTORS
-
-FAR_ABOVE, FAR_BELOW = 30.0, 1e-4
-"""How many times as large as the largest in the trials a value is that does what an infinite one
-does; and the share of it that does what none does."""
-
 
 LEAST_ROWS = 3
 """Fewest readings from which a speed is taken."""

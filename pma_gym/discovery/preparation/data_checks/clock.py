@@ -8,30 +8,16 @@ from numpy.typing import NDArray
 
 from pma_gym.data.datasets.dataset import NamedTrial
 from pma_gym.discovery.preparation.data_checks.simulated import Pair, pairs
+from pma_gym.discovery.thresholds import CLEAR_RATE, FASTEST_S, LOG_ROWS, SLOWEST_S, SMOOTH
 from pma_gym.plant.model import Model
 
 Array = NDArray[np.float64]
-
-SLOWEST_S = 0.5
-"""Usual step (s) from which on a log cannot show this rig: it moves and settles in less."""
-
-FASTEST_S = 2e-5
-"""Usual step (s) below which no logger of such a rig samples."""
-
-LEAST_ROWS = 50
-"""Fewest rows of such a log: a table of few readings may be as slow as it likes."""
-
-SMOOTH = 0.25
-"""Largest share of its span that a signal changes by from row to row in a log of one course."""
 
 RATES_HZ = (
     *(10.0, 20.0, 25.0, 50.0, 60.0, 64.0, 100.0, 120.0, 125.0, 128.0, 200.0, 250.0, 256.0, 384.0),
     *(400.0, 500.0, 512.0, 1000.0, 1024.0, 2000.0, 5000.0, 10000.0),
 )
 """Usual rates of loggers."""
-
-CLEAR = 0.7
-"""Largest share of the next best misfit at which the best rate is proposed."""
 
 
 def wrong_clock(named: Sequence[NamedTrial], model: Model) -> tuple[str, float] | None:
@@ -41,7 +27,7 @@ def wrong_clock(named: Sequence[NamedTrial], model: Model) -> tuple[str, float] 
         What to say, and the factor that makes seconds of it, 0 where it is not known; None where
         the time may be right.
     """
-    dense = [each for each in named if len(each.trial) >= LEAST_ROWS and _moves_smoothly(each)]
+    dense = [each for each in named if len(each.trial) >= LOG_ROWS and _moves_smoothly(each)]
     steps = [float(np.median(np.diff(each.trial.time))) for each in dense]
     if not dense or 2 * len(dense) < len(named):
         return None
@@ -59,7 +45,7 @@ def _moves_smoothly(each: NamedTrial) -> bool:
     for values in each.trial.measurements.values():
         there = values[np.isfinite(values)]
         span = float(np.ptp(there)) if there.size else 0.0
-        if there.size < LEAST_ROWS or span == 0.0:
+        if there.size < LOG_ROWS or span == 0.0:
             continue
         # Nine of ten rows: a step is one row, and noise is none of a signal that moves.
         if float(np.quantile(np.abs(np.diff(there)), 0.9)) < SMOOTH * span:
@@ -97,7 +83,7 @@ def _likely_rate(dense: Sequence[NamedTrial], model: Model) -> float | None:
         return None
     best = min(misfits, key=lambda rate: misfits[rate])
     others = [left for rate, left in misfits.items() if not 0.75 < rate / best < 1.34]
-    return best if misfits[best] <= CLEAR * min(others, default=np.inf) else None
+    return best if misfits[best] <= CLEAR_RATE * min(others, default=np.inf) else None
 
 
 def _misfit(pair: Pair) -> float:
