@@ -82,6 +82,12 @@ FASTEST_S = 2e-5
 SMOOTH = 0.25
 """Largest share of its span by which a log of one course changes from row to row: assumption."""
 
+USUAL_STEP_S = (5e-4, 0.1)
+"""Steps (s) of a log of such a rig, between which another unit of time is proposed: assumption."""
+
+SAME_RATE = (0.75, 1.34)
+"""Ratios of two rates between which they count as one: assumption."""
+
 CLEAR_RATE = 0.7
 """Largest share of the next best misfit at which the best rate is proposed: assumption."""
 
@@ -100,6 +106,9 @@ BEYOND = 1.2
 
 UNDOUBTED_M = 1e-3
 """Misfit (rms) of contraction (m) below which the commands are not doubted: assumption."""
+
+MOVING_SLOPE = 0.3
+"""Share of the mean first speed that a parabola has at the beginning: a rig at rest has none."""
 
 BETTER_BEGINNING = 0.5
 """Largest share of the misfit of a beginning at rest that one in motion leaves: assumption."""
@@ -470,6 +479,9 @@ NOISE_LEFT, MOST_OF_IT = 1.05, 0.8
 """Noises left from which on another effect counts that carries this share of what is left beyond
 the noise: an approximate law leaves less, and no other law carries that."""
 
+MAJORITY = 0.5
+"""Share of the trials left out that an effect, or a law, must predict better: most of them."""
+
 COST = 3.0
 """Log-likelihood that a parameter costs: half the logarithm of some 400 effective readings."""
 
@@ -544,6 +556,9 @@ EXTRAPOLATED = 1.0
 """Scatter from which on it is extrapolated: sizes of groups come from slopes, which hold for small
 changes. Sizes that really scattered by more than themselves would leave a residual."""
 
+LEAST_GROUPS = 3
+"""Fewest groups in which an effect is seen that tell whether its size differs: assumption."""
+
 CONDITION_GROUPS = 4
 """Groups of equal size by each condition: quarters of the data."""
 
@@ -553,6 +568,10 @@ MOST_OF_SHAPES = 1.25
 MOST_OF_RIVALS = 0.05
 """Share of the misfit beyond noise (sum of squares) that one law of the position alone may leave
 where a rival draws the rest as well: a right law leaves less, whatever smaller effect is beside."""
+
+PERIODIC_TURNS, BUMP_HEIGHTS = 4, 3
+"""Changes of sign from which on a drawn law is periodic: two periods; and heights above half the
+largest up to which it is a bump. Assumptions."""
 
 UNDETERMINED = 3.0
 """Times the median standard error from which on a height is none that the data know."""

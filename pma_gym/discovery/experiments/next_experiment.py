@@ -168,7 +168,7 @@ def next_experiment(
         What to measure next; None where there are not two rivals, see `experiment_to_detect` then,
         or where no excitation is safe.
     """
-    if len(rivals) < 2:
+    if len(rivals) <= 1:
         return None
     discrimination = Discrimination.of(problem, rivals, seed)
     best = fastest(discrimination, list(library([*discrimination.models, problem.given], seed)))

@@ -77,7 +77,7 @@ def widened(
     for group in groups:
         _, index = np.unique(group, return_inverse=True)
         count = int(index.max()) + 1
-        if count < 2:
+        if count <= 1:
             continue
         summed = np.zeros((count, pulls.shape[1]))
         np.add.at(summed, index, pulls)

@@ -93,7 +93,7 @@ class EffectSelection:
             self._keep(chains)
             *before, now, last = chains[0]
             chain = [*before, again(now, last), last]
-            if len(chain) == 2:
+            if not before:
                 best = chain[:1]
             if self._lead(chain[:-1], best) > 0.0:
                 best = chain[:-1]

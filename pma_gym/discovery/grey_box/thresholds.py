@@ -52,3 +52,10 @@ Assumption: a data sheet or a scale is off by less, so that beyond it the fit be
 
 SMALL = 0.1
 """Share of the gap (logarithm of the misfit) that an addition closes where much is left."""
+
+LEAST_TRIALS = 3
+"""Trials from which on one of them may be the odd one: of two neither is."""
+
+STEP_MISS, STEP_SHARE = 0.1, 0.9
+"""Share of a step that a gap between readings may miss a whole one by, and share of gaps that must
+not for readings to keep to steps. Assumptions."""

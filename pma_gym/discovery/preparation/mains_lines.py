@@ -31,6 +31,9 @@ whole one passes a line by."""
 BESIDE_HZ = np.array([-2.5, -2.1, -1.7, -1.3, 1.3, 1.7, 2.1, 2.5])
 """Where the residual beside a line is taken (Hz from it)."""
 
+SAME_HZ = 1e-9
+"""Difference of two frequencies that are one (Hz): rounding."""
+
 SLOW = 6
 """Powers of the time, from 0 on, that are slow."""
 
@@ -59,7 +62,7 @@ def with_lines(
         for harmonic in HARMONICS:
             for channel, each in enumerate(noise):
                 hertz = harmonic * base
-                if any(abs(hertz - other) < 1e-9 for other in lines[channel]):
+                if any(abs(hertz - other) < SAME_HZ for other in lines[channel]):
                     continue
                 size, chance = _line(hertz, logged, [part[channel] for part in left])
                 least = LEAST_HARMONIC if named[channel] else SLIGHT

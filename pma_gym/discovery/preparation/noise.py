@@ -20,6 +20,7 @@ from pma_gym.discovery.thresholds import (
     FIRST_REST_S,
     LEAST_REST,
     LEAST_SEGMENTS,
+    MISS,
     MOVING_SPREAD,
     QUIETEST,
     REST_S,
@@ -38,6 +39,9 @@ numbers, the smallest."""
 
 MOST_STEPS = 4e6
 """Most steps in a signal's span that are seen: an encoder of 50 nm over 0.2 m."""
+
+LEAST_DISTINCT = 4
+"""Fewest different readings that tell a step."""
 
 MOST_ORDER = 6
 """Highest order of an autoregression."""
@@ -228,7 +232,7 @@ def distinct_readings(trials: Sequence[Logged], channel: int) -> Array:
 def step_between(trials: Sequence[Logged], channel: int) -> float:
     """Smallest step between readings (SI), where they keep to whole steps; else 0."""
     distinct = distinct_readings(trials, channel)
-    if len(distinct) < 4:
+    if len(distinct) < LEAST_DISTINCT:
         return 0.0
     gaps = np.diff(distinct)
     span = float(distinct[-1] - distinct[0])
@@ -242,7 +246,7 @@ def step_between(trials: Sequence[Logged], channel: int) -> float:
     whole = (distinct - distinct[0]) / step
     miss = np.abs(whole - np.round(whole))
     # Readings in files are rounded to some digits: a hundredth of a step may be lost.
-    return step if float(np.max(miss)) < 0.05 else 0.0
+    return step if float(np.max(miss)) < MISS else 0.0
 
 
 def slow_part(parts: Sequence[Array], rate_hz: float, level: float = 0.0) -> float:

@@ -66,7 +66,7 @@ def scan_statistic(
         for piece in np.split(part, at[1:-1])
     ]
     pieces = [piece for piece in pieces if len(piece) >= LEAST_REST]
-    if len(pieces) < 2:
+    if len(pieces) <= 1:
         return NO_EXCESS
     noise = noise_of(parts, level)
     beyond = [np.maximum(np.abs(piece) - 0.5 * step, 0.0) / noise.level for piece in pieces]

@@ -21,6 +21,9 @@ PIECE_BINS = 20
 """Ticks of a piece that is dealt as a whole: a second, longer than the memory of noise and
 plant."""
 
+SPEED_ROWS = 3
+"""Fewest readings from which a speed is taken."""
+
 SMOOTH_S = 0.03
 """Time over which a speed is taken (s): longer than noise and a slip of dry friction, shorter than
 a motion."""
@@ -107,7 +110,7 @@ def _of_trial(logged: Logged, conditions: Mapping[str, Array], residual: Array) 
 
 def _padded(values: Array, spare: int) -> Array:
     """Some more ticks: without readings, in a condition that lies in no region."""
-    if values.ndim == 2:
+    if values.ndim > 1:
         return np.pad(values, ((0, 0), (0, spare)))
     return np.pad(values, (0, spare), constant_values=np.nan)
 
@@ -150,7 +153,7 @@ def _conditions(
 
 
 def _speed(time: Array, position: Array) -> Array:
-    if len(time) < 3:
+    if len(time) < SPEED_ROWS:
         return np.zeros(len(time))
     width = max(1, round(SMOOTH_S / float(np.median(np.diff(time)))))
     sums = np.cumsum(np.append(0.0, position))

@@ -69,7 +69,7 @@ def _left(problem: FitProblem, state: Nested, path: str) -> Nested | None:
     place = _place(state.chosen, path)
     candidate = state.chosen[place]
     shape = not candidate.amplitudes[candidate.paths.index(path)]
-    if path not in candidate.fitted_paths or len(candidate.fitted_paths) < 2:
+    if path not in candidate.fitted_paths or len(candidate.fitted_paths) <= 1:
         return None
     value, error = state.fit.estimate(path)
     # A size goes only where the trials do not show it at all: a friction by what nothing carries.

@@ -102,7 +102,7 @@ def _chi_squares(problem: FitProblem, fit: Fitted, chosen: Chosen) -> Array:
 def _is_by_chance(differences: Array) -> bool:
     """Whether differences add up to no more than chance would have them."""
     count = len(differences)
-    if not np.isfinite(differences).all() or count < 2:
+    if not np.isfinite(differences).all() or count <= 1:
         return False
     chance = CONFIDENCE * np.sqrt(count) * differences.std(ddof=1)
     return bool(differences.sum() <= chance)

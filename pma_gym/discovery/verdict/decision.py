@@ -8,6 +8,7 @@ from pma_gym.discovery.diagnosis import Verdict
 from pma_gym.discovery.fitting.free_parameters import values
 from pma_gym.discovery.thresholds import (
     LEAST_CHANGE,
+    MAJORITY,
     MOST_RIVALS,
     MUCH_EXPLAINED,
     SLIGHT,
@@ -87,7 +88,7 @@ def _confirmed(findings: Findings) -> bool:
         return True
     with_it, without = findings.unseen.deviance, findings.unseen_without.deviance
     # By the number of folds too: one beyond what the others reach may weigh more than all.
-    return bool(with_it.sum() < without.sum() or np.mean(with_it < without) > 0.5)
+    return bool(with_it.sum() < without.sum() or np.mean(with_it < without) > MAJORITY)
 
 
 def _change(findings: Findings) -> float:

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
 from pma_gym.discovery.fitting.fit_problem import FitProblem, Fitted
 from pma_gym.discovery.preparation.whitened_residuals import Pieces, WhitenedResiduals
-from pma_gym.discovery.thresholds import CONDITION_GROUPS, LEAST_GAIN, SURE
+from pma_gym.discovery.thresholds import CONDITION_GROUPS, LEAST_GAIN, LEAST_GROUPS, SURE
 from pma_gym.effects import CATALOGUE
 from pma_gym.estimation.least_squares import inverse
 
@@ -152,7 +152,7 @@ def _scatter(
     np.add.at(shared, group, across)
     strength = shared @ direction
     seen = strength > SURE**2
-    if seen.sum() < 3:
+    if seen.sum() < LEAST_GROUPS:
         return 0.0
     known = np.isfinite(np.diag(own))
     shared = shared[:, known][seen]

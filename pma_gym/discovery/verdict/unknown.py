@@ -168,7 +168,7 @@ def _undetermined(findings: Findings) -> Reason | None:
         ]
         sizes.append(max((abs(size - none) / error for size, error, none in known), default=np.inf))
     undetermined = [size for size in sizes if size < CONFIDENCE]
-    if len(undetermined) < 2:
+    if len(undetermined) <= 1:
         return None
     return Reason("undetermined", max(undetermined), CONFIDENCE, final=True)
 
@@ -190,7 +190,7 @@ def _drawn_by_shapes(findings: Findings, much: bool) -> Reason | None:
             drawing.append(candidate.effect)
             drawing += [rival.candidate.effect for rival in rivals if rival.equal and much]
     drawing = [name for name in drawing if _of_place(name)]
-    if len(drawing) < 2:
+    if len(drawing) <= 1:
         return None
     sizes = left_in_noises(findings.problem, findings.selection.fit, chosen)
     name = max(sizes, key=lambda each: sizes[each])

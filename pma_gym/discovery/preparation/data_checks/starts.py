@@ -22,6 +22,7 @@ from pma_gym.discovery.thresholds import (
     LEAST_COUNTED,
     LEAST_FORGETTING_S,
     LONGER,
+    MOVING_SLOPE,
 )
 from pma_gym.plant import sensors
 from pma_gym.plant.model import Model
@@ -195,7 +196,11 @@ def _first_speed(trial: Trial, quantity: str) -> tuple[str, float, float] | None
     line = float(np.polyfit(time[:count], values[:count], 1)[0])
     error = noise / float(np.sqrt(np.sum((time[:count] - time[:count].mean()) ** 2)))
     sure = abs(line) / error
-    if sure < CERTAIN or abs(line) < SIGNALS[quantity].least_rate or coefficients[1] / line < 0.3:
+    if (
+        sure < CERTAIN
+        or abs(line) < SIGNALS[quantity].least_rate
+        or coefficients[1] / line < MOVING_SLOPE
+    ):
         return None
     return quantity, line, sure
 

@@ -27,6 +27,9 @@ Array = NDArray[np.float64]
 MOST_S = 0.25
 """Longest lag that is looked for (s)."""
 
+LEAST_READINGS, LEAST_INNER = 20, 10
+"""Fewest readings that tell a lag, in all and away from the ends."""
+
 DIRECT = ("load", "pressure")
 """Signals that follow their commands straight. Friction and hysteresis make motion late, alone."""
 
@@ -70,7 +73,7 @@ def words(late: dict[str, float]) -> list[str]:
 def _lag(pair: Pair, quantity: str) -> tuple[float, bool] | None:
     """Lag of a signal (s), and whether it is clear; None where the signal hardly moves."""
     time, simulated, measured = pair.signal(quantity)
-    if time.size < 20 or np.ptp(simulated) <= SIGNALS[quantity].least_span:
+    if time.size < LEAST_READINGS or np.ptp(simulated) <= SIGNALS[quantity].least_span:
         return None
     if abs(float(np.corrcoef(simulated, measured)[0, 1])) < CORRELATED / 2.0:
         return None
@@ -92,7 +95,7 @@ def _lag(pair: Pair, quantity: str) -> tuple[float, bool] | None:
 def _left(time: Array, simulated: Array, measured: Array, lag: float) -> float:
     """Square of what the simulated signal, so late and times a factor, leaves."""
     inner = (time > time[0] + MOST_S) & (time < time[-1] - 0.05)
-    if inner.sum() < 10:
+    if inner.sum() < LEAST_INNER:
         inner[:] = True
     late = np.interp(time - lag, time, simulated)[inner]
     columns = np.stack([late, np.ones(late.size)], axis=1)

@@ -118,6 +118,9 @@ PRESSURE_COMMAND_UNITS = (
     Unit(1.0, "absolute pressure", -ATMOSPHERE, command=True),
 )
 
+LEAST_READINGS = 8
+"""Fewest readings that tell a slope."""
+
 MOST_LAG_S, LAGS = 0.3, 61
 """How late a signal may be for its slope; how many lags are tried."""
 
@@ -142,7 +145,7 @@ def slope_of(pair: Pair, quantity: str) -> Slope | None:
     """Robust slope of a measured signal on the simulated one; None where it hardly moves."""
     time, simulated, measured = pair.signal(quantity)
     least = SIGNALS[quantity].least_span
-    if time.size < 8 or np.ptp(simulated) <= least or np.ptp(measured) == 0.0:
+    if time.size < LEAST_READINGS or np.ptp(simulated) <= least or np.ptp(measured) == 0.0:
         return None
     best = max(_correlations(time, simulated, measured), key=lambda each: abs(each[0]) + each[2])
     alike, lag, _ = best
