@@ -16,6 +16,8 @@ import pytest
 from controllers import CONTROLLERS
 from pma_gym.data.serres2008 import corrections
 from pma_gym.data.trial_columns import BY_NAME
+from pma_gym.discovery import thresholds
+from pma_gym.discovery.grey_box import thresholds as likelihood
 from pma_gym.effects import CATALOGUE
 from pma_gym.envs import ENVIRONMENTS, Options
 from pma_gym.plant.model import load_model, shipped_models
@@ -104,6 +106,25 @@ def test_environments_page_is_complete(page):
     names = [field.name for field in fields(Options)]
     for name in (*names, *REWARDS, *RANDOMISATIONS, *DISTURBANCES, *EVERY_TASK, *ENVIRONMENTS):
         assert f"`{name}`" in text
+
+
+@pytest.mark.parametrize(
+    ("name", "method"), [("thresholds", thresholds), ("grey_box/thresholds", likelihood)]
+)
+def test_every_decision_number_is_listed_with_its_meaning(generators, page, name, method):
+    listed = generators.GENERATORS["decision_numbers"](name)
+    assert listed in page("reference/diagnosis-method.md")
+    numbers = {key: value for key, value in vars(method).items() if key.isupper()}
+    for key, value in numbers.items():
+        (stated,) = re.findall(rf"^\| `[^`]*\b{key}\b[^`]*` \| `(.+?)` \| \w.+ \|$", listed, re.M)
+        read = eval(stated, dict(numbers))
+        assert value == read or value in read
+
+
+def test_numerics_are_listed_apart(generators, page):
+    listed = generators.GENERATORS["numerics"]()
+    assert listed in page("reference/diagnosis-method.md") and "thresholds" not in listed
+    assert "| `fitting/levenberg_marquardt` | `CLOSE` | `0.001` |" in listed
 
 
 def test_columns_and_controllers_are_listed(page):

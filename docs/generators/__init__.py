@@ -9,11 +9,19 @@ import re
 from collections.abc import Callable
 from textwrap import indent
 
-from generators import catalogue, commands, dissertation, environments, models, results
+from generators import (
+    catalogue,
+    commands,
+    decisions,
+    dissertation,
+    environments,
+    models,
+    results,
+)
 
 GENERATORS: dict[str, Callable[..., str]] = {
     name: function
-    for module in (catalogue, commands, dissertation, environments, models, results)
+    for module in (catalogue, commands, decisions, dissertation, environments, models, results)
     for name, function in inspect.getmembers(module, inspect.isfunction)
     if function.__module__ == module.__name__ and not name.startswith("_")
 }

@@ -44,7 +44,8 @@ from pma_gym.discovery.result.next_experiment import NextExperiment
 from pma_gym.discovery.screening.localisation import localise
 from pma_gym.discovery.screening.residuals import residuals
 from pma_gym.discovery.selection.backward_elimination import as_given
-from pma_gym.discovery.verdict.approximate import MOST_SCATTER, closing
+from pma_gym.discovery.thresholds import APPROXIMATE_SCATTER, CONFIDENCE, UNDETECTABLE_WORTH
+from pma_gym.discovery.verdict.approximate import closing
 from pma_gym.discovery.verdict.decision import suspicious, verdict_of
 from pma_gym.discovery.verdict.findings import Findings
 from pma_gym.discovery.verdict.residual_fraction import ResidualFraction, residual_fraction, tones
@@ -88,8 +89,8 @@ def amended_model(findings: Findings, verdict: Verdict) -> Model:
         known = bool(np.isfinite(error))
         notes[path] = Note(
             f"fitted to {len(findings.named)} trials by pma_gym.discovery",
-            value - 1.96 * error if known else None,
-            value + 1.96 * error if known else None,
+            value - CONFIDENCE * error if known else None,
+            value + CONFIDENCE * error if known else None,
         )
     for path in findings.selection.undetermined if verdict in ("effect", "unknown") else ():
         notes[path] = Note("not determined by the trials: held where its law is at a limit")
@@ -99,11 +100,6 @@ def amended_model(findings: Findings, verdict: Verdict) -> Model:
         title=f"{findings.given.title}; amended by a diagnosis",
         notes=notes,
     )
-
-
-SILENT = 0.2
-"""Share of the catalogue that would not have shown, from which on an experiment that would show it
-is proposed although nothing seems to be missing."""
 
 
 def proposed_experiment(
@@ -134,7 +130,7 @@ def proposed_experiment(
         following = next_experiment(problem, pair, findings.seed)
         if following is not None:
             return following
-    silent = verdict in ("parameters", "agrees") and len(not_detectable) > SILENT * len(
+    silent = verdict in ("parameters", "agrees") and len(not_detectable) > UNDETECTABLE_WORTH * len(
         findings.candidates
     )
     if (verdict == "undecidable" or silent) and findings.scores:
@@ -261,7 +257,7 @@ def _decision(findings: Findings, left: ResidualFraction) -> _Decision:
         closes is not None
         and closes.named
         and not final
-        and widest_scatter(findings) <= MOST_SCATTER
+        and widest_scatter(findings) <= APPROXIMATE_SCATTER
     ):
         # An approximate law is a name where a right one would be; else the verdict stays.
         named = verdict_of(findings, None, not_detectable, bool(coarse), off)

@@ -5,12 +5,12 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
-from pma_gym.discovery.fitting.fit_problem import SURE, Fitted
+from pma_gym.discovery.fitting.fit_problem import Fitted
 from pma_gym.discovery.fitting.free_parameters import at_limit, unit
 from pma_gym.discovery.result.estimates import Covariance, Estimate, NamedEffect, RivalModel
 from pma_gym.discovery.screening.score_test import ScreeningScore
-from pma_gym.discovery.selection.candidate_fits import LEAST_GAIN
 from pma_gym.discovery.selection.stages import Stage
+from pma_gym.discovery.thresholds import CONFIDENCE, LEAST_GAIN
 from pma_gym.discovery.verdict.findings import Findings
 from pma_gym.plant.model import Model, ModelError
 
@@ -61,7 +61,9 @@ def estimate(findings: Findings, fit: Fitted, path: str) -> Estimate:
     low, high = max(low, lower), min(high, upper)
     # A range may be a million times as wide as what a light axis has: what is surely off an end of
     # it is not at that end, whatever another law makes of it.
-    limit = "" if lower < value - SURE * error and value + SURE * error < upper else limit
+    limit = (
+        "" if lower < value - CONFIDENCE * error and value + CONFIDENCE * error < upper else limit
+    )
     return Estimate(value, low, high, unit(path), limit)
 
 

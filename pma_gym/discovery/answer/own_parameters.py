@@ -9,14 +9,8 @@ from pma_gym.discovery.fitting.fit_problem import Fitted
 from pma_gym.discovery.fitting.free_parameters import values
 from pma_gym.discovery.report.verdict_text import doubt, twin, unidentified
 from pma_gym.discovery.result.estimates import Moved
+from pma_gym.discovery.thresholds import DETERMINED, SURE
 from pma_gym.discovery.verdict.findings import Findings
-
-MOVED = 3.0
-"""Standard errors by which a parameter must move to be said to have been off."""
-
-DETERMINED = 0.7
-"""A parameter whose standard error is a larger share of what was assumed of it beforehand is not
-determined by the data."""
 
 
 def moved_parameters(findings: Findings, fit: Fitted) -> Mapping[str, Moved]:
@@ -29,7 +23,7 @@ def moved_parameters(findings: Findings, fit: Fitted) -> Mapping[str, Moved]:
         if score > 1.0:
             moved[path] = (
                 score,
-                Moved(float(before), estimate(findings, fit, path), bool(score > MOVED)),
+                Moved(float(before), estimate(findings, fit, path), bool(score > SURE)),
             )
     return {path: each for path, (_, each) in sorted(moved.items(), key=lambda item: -item[1][0])}
 

@@ -11,13 +11,11 @@ from pma_gym.discovery.fitting.candidate_effect import CandidateEffect, bounds
 from pma_gym.discovery.fitting.fit_problem import FitProblem, Fitted
 from pma_gym.discovery.fitting.predictive_density import unabsorbed
 from pma_gym.discovery.result.next_experiment import NextExperiment
-from pma_gym.discovery.screening.score_test import SHOWN_GAIN, ScreeningScore
+from pma_gym.discovery.screening.score_test import ScreeningScore
+from pma_gym.discovery.thresholds import SHOWN_GAIN, SMALLEST_SIZE
 from pma_gym.effects import CATALOGUE
 
 Array = NDArray[np.float64]
-
-SMALLEST = 0.1
-"""Least size of an effect that is reckoned with, as a share of its usual one."""
 
 
 def experiment_to_detect(
@@ -74,7 +72,7 @@ def chance_to_show(gains: Array) -> Array:
             the size.
     """
     share = np.sqrt(SHOWN_GAIN / np.maximum(gains, 1e-12))
-    return np.clip(np.log(share) / np.log(SMALLEST), 0.0, 1.0)
+    return np.clip(np.log(share) / np.log(SMALLEST_SIZE), 0.0, 1.0)
 
 
 def _strength(each: ScreeningScore) -> float:

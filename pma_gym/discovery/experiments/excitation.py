@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pma_gym.data.trial import Trial
+from pma_gym.discovery.thresholds import LEAST_LOAD_N, LIMIT_SHARE, MOST_VOLTS
 from pma_gym.plant.model import Model
 from pma_gym.plant.plant import Plant
 
@@ -24,17 +25,8 @@ Knots = Sequence[tuple[float, float]]
 RATE_HZ = 128.0
 """Commands a second; what a lab's DAQ can do, and fine enough that a step is a step."""
 
-MARGIN = 0.9
-"""Share of each limit that an excitation may use."""
-
 SIZES = (1.0, 0.85, 0.7, 0.55, 0.4)
 """Shares of the full range that are tried until an excitation is safe."""
-
-LEAST_LOAD_N = 25.0
-"""Least load (N): the cable stays taut."""
-
-MOST_VOLTS = 9.5
-"""Most volts of a command, of the 10 that there are."""
 
 PRESSURES = (0.12, 0.5, 0.88)
 """Constant pressures of excitations that change the load, as shares of the range of pressures."""
@@ -90,8 +82,8 @@ class Range:
         least, most = (drive.gain * volts + drive.offset for volts in (0.0, MOST_VOLTS))
         low, high = (line.gain * volts + line.offset for volts in (0.0, MOST_VOLTS))
         return cls(
-            (max(LEAST_LOAD_N, least), min(most, MARGIN * limits.tension)),
-            (max(valid.lowest, low), min(valid.highest, MARGIN * limits.pressure, high)),
+            (max(LEAST_LOAD_N, least), min(most, LIMIT_SHARE * limits.tension)),
+            (max(valid.lowest, low), min(valid.highest, LIMIT_SHARE * limits.pressure, high)),
         )
 
     def pressure(self, share: Shares) -> Shares:
@@ -155,7 +147,7 @@ def is_safe(model: Model, simulated: Trial) -> bool:
         (np.max(truth["pressure"]), limits.pressure),
     )
     # A number that is none keeps no limit.
-    return all(reached <= MARGIN * limit for reached, limit in kept)
+    return all(reached <= LIMIT_SHARE * limit for reached, limit in kept)
 
 
 def _recipes(model: Model, seed: int) -> Iterator[Recipe]:

@@ -25,18 +25,11 @@ from pma_gym.discovery.fitting.candidate_effect import CandidateEffect, bounds
 from pma_gym.discovery.fitting.fit_problem import FitProblem, Fitted
 from pma_gym.discovery.fitting.predictive_density import covariance_root, unabsorbed
 from pma_gym.discovery.result.next_experiment import NextExperiment
-from pma_gym.discovery.screening.score_test import SHOWN_GAIN
+from pma_gym.discovery.thresholds import RESOLVED, SETTLED
 from pma_gym.plant.model import Model
 
 Array = NDArray[np.float64]
 Rival = tuple[Fitted, tuple[CandidateEffect, ...]]
-
-ENOUGH = SHOWN_GAIN / 2.0
-"""Log odds that settle a question: five standard deviations. A shorter test that would leave it
-open is not preferred to one that settles it."""
-
-LEAST = 1.0
-"""Log odds below which no excitation tells two rivals apart at all."""
 
 DRAWS = 8
 """Sizes and shapes of effects that the promise is tried on, beside the estimate."""
@@ -62,7 +55,7 @@ class ExpectedOdds:
     @property
     def rank(self) -> tuple[bool, float]:
         """What the choice goes by: whether it settles the question, then log odds a minute."""
-        return self.log_odds >= ENOUGH, self.log_odds / self.excitation.minutes
+        return self.log_odds >= SETTLED, self.log_odds / self.excitation.minutes
 
 
 @dataclass(frozen=True)
@@ -175,7 +168,7 @@ def next_experiment(
         What to measure next; None where there are not two rivals, see `experiment_to_detect` then,
         or where no excitation is safe.
     """
-    if len(rivals) < 2:
+    if len(rivals) <= 1:
         return None
     discrimination = Discrimination.of(problem, rivals, seed)
     best = fastest(discrimination, list(library([*discrimination.models, problem.given], seed)))
@@ -203,7 +196,7 @@ def fastest(
     pairs = discrimination.pairs()
     bound = discrimination.odds(excitations, pairs, refitted=False)
     # Two rivals that nothing tells apart must not hide what tells them from a third.
-    resolved = np.max(bound, axis=0) >= LEAST
+    resolved = np.max(bound, axis=0) >= RESOLVED
     kept = np.flatnonzero(resolved if resolved.any() else ~resolved)
     chosen = [pairs[k] for k in kept]
     hoped = [

@@ -12,13 +12,11 @@ from pma_gym.discovery.experiments.excitation import Excitation
 from pma_gym.discovery.fitting.fit_problem import FitProblem, Fitted
 from pma_gym.discovery.preparation.whitened_residuals import WhitenedResiduals
 from pma_gym.discovery.result.next_experiment import NextExperiment
+from pma_gym.discovery.thresholds import MOST_LOG_ODDS
 from pma_gym.plant.model import Model
 
 Array = NDArray[np.float64]
 Columns = NDArray[np.float32]
-
-MOST = 50.0
-"""Largest log odds that are promised: no model is that exact."""
 
 
 def predicted(
@@ -93,9 +91,9 @@ def proposal(excitation: Excitation, separates: Sequence[str], log_odds: float) 
     Args:
         excitation: its name and commands.
         separates: names of what it tells apart.
-        log_odds: natural logarithm of the odds to expect; no more than `MOST` is promised.
+        log_odds: natural logarithm of the odds to expect; no more than `MOST_LOG_ODDS` is promised.
     """
-    odds = math.exp(min(log_odds, MOST))
+    odds = math.exp(min(log_odds, MOST_LOG_ODDS))
     note = {"note": f"proposed: {excitation.name}"}
     trial = Trial(excitation.trial.time, excitation.trial.commands, provenance=note)
     return NextExperiment(excitation.name, tuple(separates), odds, excitation.minutes, trial)

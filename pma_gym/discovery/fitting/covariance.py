@@ -13,18 +13,10 @@ from numpy.typing import NDArray
 
 from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
 from pma_gym.discovery.fitting.fit_problem import FitProblem, Fitted
-from pma_gym.discovery.preparation.whitened_residuals import PIECE_S, Pieces
+from pma_gym.discovery.preparation.whitened_residuals import Pieces
+from pma_gym.discovery.thresholds import BLOCK_S, INDEPENDENT_S, LEAST_STRETCHES, LEAST_TRIALS
 
 Array = NDArray[np.float64]
-
-STRETCH_S = 1.0
-"""Length of the shortest stretches of time (s)."""
-
-LEAST_STRETCHES = 10
-"""Fewer stretches than this are too few to tell how parameters scatter between them."""
-
-LEAST_TRIALS = 4
-"""Fewer trials than this say nothing of how parameters scatter between them."""
 
 
 def covariance(problem: FitProblem, fit: Fitted, chosen: Sequence[CandidateEffect]) -> Array:
@@ -56,7 +48,7 @@ def clusters(pieces: Pieces, runs: Sequence[int] = ()) -> list[NDArray[np.int64]
     """
     run = np.asarray(runs)[pieces.trial] if len(runs) else pieces.trial
     order = np.arange(len(run)) - np.searchsorted(run, run)
-    length, groups = round(STRETCH_S / PIECE_S), []
+    length, groups = round(BLOCK_S / INDEPENDENT_S), []
     while True:
         stretch = order // length
         group = run * (stretch.max() + 1) + stretch
@@ -85,7 +77,7 @@ def widened(
     for group in groups:
         _, index = np.unique(group, return_inverse=True)
         count = int(index.max()) + 1
-        if count < 2:
+        if count <= 1:
             continue
         summed = np.zeros((count, pulls.shape[1]))
         np.add.at(summed, index, pulls)

@@ -13,25 +13,8 @@ import numpy as np
 from pma_gym.discovery.fitting.fit_problem import FitProblem, Fitted
 from pma_gym.discovery.preparation.noise import level_of_neighbours
 from pma_gym.discovery.preparation.recorded_bandwidth import BANDWIDTH, recorded_bandwidth
+from pma_gym.discovery.thresholds import FALLS, LEAST_DEFLECTION, SLIGHT, STRUCTURE, WORSE
 from pma_gym.plant.imposed_motion import smoothed
-
-MOTION = 3.0
-"""Noises of the record from which on what a bandwidth takes from it counts as motion."""
-
-DEFLECTION = 1e-5
-"""Share of the way that a bandwidth may take from it: a contact that turns round deflects by more
-(an assumption)."""
-
-CHANGE = 0.1
-"""Change of the force by a bandwidth twice as large, in standard deviations of its noise, that does
-not count."""
-
-FALLS = 3.0
-"""How many times less a doubled bandwidth must change the force than the one before, at least."""
-
-WORSE = 1.01
-"""Chi-square over that at the stated bandwidth from which on a faster motion is refused: the record
-has hum, say, which nothing moves by."""
 
 
 def with_fast_motion(problem: FitProblem, refitted: Fitted) -> tuple[FitProblem, Fitted, str]:
@@ -51,7 +34,7 @@ def with_fast_motion(problem: FitProblem, refitted: Fitted) -> tuple[FitProblem,
         twice = min(2.0 * bandwidth, most)
         change = _change_of_force(problem, refitted, bandwidth, twice)
         # What hardly falls is no motion: noise of the record, or lines between its rows.
-        if not _takes_motion(problem, bandwidth) and (change < CHANGE or change > before / FALLS):
+        if not _takes_motion(problem, bandwidth) and (change < SLIGHT or change > before / FALLS):
             break
         bandwidth, before = twice, change
     if bandwidth == stated:
@@ -82,7 +65,7 @@ def _takes_motion(problem: FitProblem, bandwidth: float) -> bool:
     ]
     size = float(np.sqrt(np.mean(np.concatenate(taken) ** 2)))
     way = max(float(np.ptp(record)) for record in records)
-    return size > max(MOTION * level_of_neighbours(records), DEFLECTION * way)
+    return size > max(STRUCTURE * level_of_neighbours(records), LEAST_DEFLECTION * way)
 
 
 def _change_of_force(

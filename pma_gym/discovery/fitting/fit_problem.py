@@ -11,9 +11,9 @@ from pma_gym.data.trial import Trial
 from pma_gym.discovery.fitting.candidate_effect import CandidateEffect, within_turn
 from pma_gym.discovery.fitting.free_parameters import FreeParameters, values
 from pma_gym.discovery.fitting.levenberg_marquardt import LevenbergMarquardt
-from pma_gym.discovery.preparation.assumed_range import LEAST_GAIN, MOST_DOUBLINGS
 from pma_gym.discovery.preparation.noise import Whitening
 from pma_gym.discovery.preparation.whitened_residuals import WhitenedResiduals
+from pma_gym.discovery.thresholds import CONFIDENCE, FLAT, MOST_DOUBLINGS, STRUCTURE
 from pma_gym.estimation.least_squares import inverse
 from pma_gym.plant.model import Model
 
@@ -25,12 +25,9 @@ ROUNDS = 25
 LARGER = (30.0, 5.0)
 """How many times as large the noise is taken for on the way to a first fit."""
 
-SURE = 1.96
-"""Standard errors of a 95 % interval."""
-
-CAUGHT, EASIER = 3.0, 10.0
-"""Residual, in standard deviations of the noise, from which on a fit may have been caught; how many
-times smaller the noise is taken for from one fit to the next on the way out."""
+EASIER = 10.0
+"""How many times smaller the noise is taken for from one fit to the next on the way out of a local
+minimum."""
 
 ROUNDING = 1e-3
 """The trials do not show a parameter whose whole range is a smaller share of its standard error."""
@@ -88,7 +85,7 @@ class Fitted:
         if not np.isfinite(error):
             return -np.inf, np.inf
         low, high = self.spread.get(path, (value, value))
-        return min(value - SURE * error, low), max(value + SURE * error, high)
+        return min(value - CONFIDENCE * error, low), max(value + CONFIDENCE * error, high)
 
 
 def _chi_square(fit: Fitted) -> float:
@@ -204,7 +201,7 @@ class FitProblem:
 
     def far(self, fit: Fitted) -> bool:
         """Whether a fit is so far from the trials that it may be in a local minimum."""
-        return self.left(fit) > CAUGHT
+        return self.left(fit) > STRUCTURE
 
     def astray(self, fit: Fitted) -> bool:
         """Whether own parameters make up for structure: beyond what is assumed, and yet far."""
@@ -317,7 +314,7 @@ class FitProblem:
                 # At the end of what it balances: a rounded number may lie beyond.
                 break
             ended = further.run(ROUNDS)
-            if not further.best.chi_square < search.best.chi_square - LEAST_GAIN:
+            if not further.best.chi_square < search.best.chi_square - FLAT:
                 break
             search, converged, reach = further, ended, wider
         paths = tuple(search.named(search.values))

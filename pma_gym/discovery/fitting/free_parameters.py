@@ -10,39 +10,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from pma_gym.discovery.thresholds import CONFIDENCE, PRIOR_LEAST, PRIOR_SHARE, PRIOR_WIDER
 from pma_gym.effects import CATALOGUE
 from pma_gym.plant import sensors
 from pma_gym.plant.model import Model
 
 Array = NDArray[np.float64]
-
-SHARE = 0.10
-"""Standard deviation of what a lab's parameters are off by, as a share of them: an assumption.
-Where data determine a parameter it hardly counts; it holds those that they do not."""
-
-LEAST = {
-    "N": 5.0,
-    "kPa": 5.0,
-    "mm": 0.5,
-    "deg": 1.0,
-    "N/mm": 0.5,
-    "N s/mm": 0.05,
-    "N/bar": 5.0,
-    "N/bar/%": 0.5,
-    "N/bar^2": 1.0,
-    "N/bar^2/%": 0.1,
-    "N/%": 1.0,
-    "N/mm/kPa": 0.002,
-    "N s/mm/kPa": 2e-4,
-    "V": 0.05,
-}
-"""Least standard deviation of a parameter by its unit, for those that may be near 0: assumptions,
-about a hundredth of what the station's quantities reach."""
-
-WIDER = 2.0
-"""How many times as wide as a model file's own 95 % interval a parameter may lie, for another
-rig."""
-
 
 AT_LIMIT = 1e-6
 """Distance from an end of a range, as a share of the range, within which a value is at that end."""
@@ -77,11 +50,11 @@ def prior(model: Model, path: str) -> float:
     value = model.values_in_files(effect)[file_key]
     assert isinstance(value, float | int)
     unit = law.quantities[law.names_in_files()[file_key]].unit
-    usual = max(SHARE * abs(value), LEAST.get(unit, 0.0))
+    usual = max(PRIOR_SHARE * abs(value), PRIOR_LEAST.get(unit, 0.0))
     note = model.notes.get(path)
     if note is not None and note.low is not None and note.high is not None:
-        usual = max(usual, WIDER * (note.high - note.low) / (2.0 * 1.96))
-    return usual if usual > 0.0 else SHARE
+        usual = max(usual, PRIOR_WIDER * (note.high - note.low) / (2.0 * CONFIDENCE))
+    return usual if usual > 0.0 else PRIOR_SHARE
 
 
 def values(model: Model, paths: Sequence[str]) -> Array:

@@ -15,6 +15,7 @@ from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
 from pma_gym.discovery.fitting.fit_problem import FitProblem, Fitted
 from pma_gym.discovery.fitting.predictive_density import PredictiveDensity
 from pma_gym.discovery.preparation.splits import folds, stretches
+from pma_gym.discovery.thresholds import MAJORITY
 
 Array = NDArray[np.float64]
 
@@ -58,7 +59,7 @@ def held_out_misfit(
         judged: whether to find out how surprising folds are.
     """
     whole = PredictiveDensity.of(problem, fit, chosen) if judged else None
-    if len(problem.trials) < 2:
+    if len(problem.trials) <= 1:
         return _unseen_stretches(problem, fit, chosen, progress, whole)
     count = len(problem.trials)
     readings: list[Array] = [np.empty(0)] * count
@@ -92,7 +93,7 @@ def is_asked_for(problem: FitProblem, whole: Fit, simpler: Fit) -> bool:
     theirs, others = (held_out_misfit(problem, *each) for each in (whole, simpler))
     if theirs is None or others is None:
         return True
-    return bool(np.mean(theirs.chi_square < others.chi_square) > 0.5)
+    return bool(np.mean(theirs.chi_square < others.chi_square) > MAJORITY)
 
 
 def _unseen_stretches(

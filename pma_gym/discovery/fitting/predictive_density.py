@@ -9,12 +9,9 @@ from numpy.typing import NDArray
 from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
 from pma_gym.discovery.fitting.fit_problem import FitProblem, Fitted
 from pma_gym.discovery.preparation.whitened_residuals import WhitenedResiduals
+from pma_gym.discovery.thresholds import PRIOR_SIZE
 
 Array = NDArray[np.float64]
-
-WIDE = 10.0
-"""How many times its size a parameter might have been, for all that is known beforehand. Outermost
-bounds say less: those of a bandwidth reach to 100 kHz."""
 
 LOOSE = 1e4
 """Standard deviation of a parameter that the trials do not determine, in steps of its
@@ -99,9 +96,9 @@ class PredictiveDensity:
 def freedom(whitened: WhitenedResiduals, fit: Fitted) -> float:
     """Log determinant of the curvature at a fit, in units of what a parameter might have been.
 
-    That is as far as its bounds reach, and `WIDE` times its value at most.
+    That is as far as its bounds reach, and `PRIOR_SIZE` times its value at most.
     """
-    size = np.where(fit.values == 0.0, np.inf, WIDE * np.abs(fit.values))
+    size = np.where(fit.values == 0.0, np.inf, PRIOR_SIZE * np.abs(fit.values))
     widths = np.minimum(whitened.upper - whitened.lower, size)
     curvature = whitened.sums(fit.values, fit.steps).curvature
     if not np.isfinite(curvature).all():

@@ -17,9 +17,10 @@ from pma_gym.discovery.grey_box.predictions import Predictions
 from pma_gym.discovery.grey_box.proposal import Proposal
 from pma_gym.discovery.grey_box.sizes import estimate, named_effects
 from pma_gym.discovery.grey_box.slots import path_of, quantity_of, slot, with_numbers
-from pma_gym.discovery.grey_box.thresholds import COMPLETE, LEFT, MATERIAL, NOISES
+from pma_gym.discovery.grey_box.thresholds import MATERIAL, NOISES
 from pma_gym.discovery.result.estimates import Moved, NamedEffect, TrialState
 from pma_gym.discovery.result.misfit import Gap, ResidualLaw, TrialRecord, rms
+from pma_gym.discovery.thresholds import COMPLETE, LEFT
 from pma_gym.effects import CATALOGUE
 from pma_gym.estimation.innovations import TREND, TRIAL
 from pma_gym.estimation.likelihood_fit import value_of

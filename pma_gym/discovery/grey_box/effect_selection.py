@@ -14,7 +14,8 @@ from pma_gym.discovery.grey_box.moves import Screening
 from pma_gym.discovery.grey_box.prepared_trials import PreparedTrials, is_rough
 from pma_gym.discovery.grey_box.refined_fits import again, other_hold, refined, trend_instead
 from pma_gym.discovery.grey_box.slots import own_coordinates
-from pma_gym.discovery.grey_box.thresholds import CONFIDENCE, LIKE, MATERIAL, MOST_EFFECTS
+from pma_gym.discovery.grey_box.thresholds import LIKE, MATERIAL
+from pma_gym.discovery.thresholds import CONFIDENCE, MOST_EFFECTS
 from pma_gym.estimation.innovations import TRIAL
 from pma_gym.estimation.likelihood_fit import BLOCKS, value_of
 
@@ -92,7 +93,7 @@ class EffectSelection:
             self._keep(chains)
             *before, now, last = chains[0]
             chain = [*before, again(now, last), last]
-            if len(chain) == 2:
+            if not before:
                 best = chain[:1]
             if self._lead(chain[:-1], best) > 0.0:
                 best = chain[:-1]

@@ -9,7 +9,7 @@ from pma_gym.discovery.grey_box.hypothesis import Hypothesis
 from pma_gym.discovery.grey_box.kept_fits import fit
 from pma_gym.discovery.grey_box.prepared_trials import PreparedTrials, is_rough
 from pma_gym.discovery.grey_box.slots import own_coordinates
-from pma_gym.discovery.grey_box.thresholds import ODD
+from pma_gym.discovery.grey_box.thresholds import LEAST_TRIALS, ODD
 from pma_gym.estimation.innovations import GreyBox, Point, log_likelihood
 from pma_gym.estimation.likelihood_fit import Coordinate, Fit, value_of, with_tied, with_values
 from pma_gym.plant.model import Model
@@ -26,8 +26,8 @@ With a large latent force of its own at the start.
 ODD_SHARE = 0.005
 """Latent force, as a share of the drive's, from which on that is done."""
 
-ALIKE = 0.5
-"""Log likelihood within which three starts agree."""
+AGREEING, ALIKE = 3, 0.5
+"""Starts that agree end the first fit, and the log likelihood within which they do."""
 
 SCATTER = 0.2
 """Standard deviation of a start's parameters, as a share of them."""
@@ -58,8 +58,8 @@ def first_fit(
 
     def start(k: int, odd: int) -> None:
         for linear in kinds:
-            # It may end after three: between that and all, until then.
-            tell("refitting parameters", k, count + 2 if k > 3 else (count + 3) // 2)
+            # It may end after `AGREEING`: between that and all, until then.
+            tell("refitting parameters", k, count + 2 if k > AGREEING else (count + AGREEING) // 2)
             box = trials.box(trials.model, linear)
             fits[linear].append(
                 fit(box, _begin(trials, seed, box, coordinates, tied, k, odd), coordinates, tied)
@@ -69,7 +69,7 @@ def first_fit(
         start(k, -1)
         kinds = (max(fits, key=lambda each: max(f.value for f in fits[each])),) if k else kinds
         values = sorted(f.value for f in fits[kinds[0]])
-        if len(values) > 2 and values[-1] - values[-3] < ALIKE:
+        if len(values) >= AGREEING and values[-1] - values[-AGREEING] < ALIKE:
             break
     trials.linear = kinds[0]
     if rough:
@@ -79,7 +79,7 @@ def first_fit(
         trials.linear = max(fits, key=lambda each: max(f.value for f in fits[each]))
     forces = max(fits[trials.linear], key=lambda each: each.value).point.forces
     if (
-        3 <= number <= MOST_TRIALS
+        LEAST_TRIALS <= number <= MOST_TRIALS
         and max(forces) > ODD * min(forces)
         and max(forces) > ODD_SHARE * trials.force
     ):

@@ -7,9 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pma_gym.data.trial_columns import BY_QUANTITY, Column
-from pma_gym.discovery.grey_box.thresholds import CONFIDENCE, LEFT
 from pma_gym.discovery.report.figure_text import capitalised, percent, signal_name
 from pma_gym.discovery.result.misfit import LatentForce, ResidualLaw
+from pma_gym.discovery.thresholds import CONFIDENCE, LEFT
 from pma_gym.estimation.innovations import PORTS, SPEEDS
 from pma_gym.estimation.smoother import Smoothed
 from pma_gym.plant.model import Model

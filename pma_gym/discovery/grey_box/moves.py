@@ -10,11 +10,14 @@ from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
 from pma_gym.discovery.grey_box.hypothesis import Hypothesis, Move, added_paths
 from pma_gym.discovery.grey_box.prepared_trials import PreparedTrials
 from pma_gym.discovery.grey_box.slots import gains_of_drive, values_of
-from pma_gym.discovery.grey_box.thresholds import ODD, TRIED
+from pma_gym.discovery.grey_box.thresholds import LEAST_TRIALS, ODD, TRIED
 from pma_gym.estimation.innovations import TREND, TRIAL
 from pma_gym.estimation.likelihood_fit import STEP, Coordinate, with_tied, with_values
 
 Array = NDArray[np.float64]
+
+NOTHING = 1e-9
+"""Square of a change, in noises, that is none: rounding."""
 
 
 @dataclass(frozen=True)
@@ -108,7 +111,7 @@ class Screening:
             for i, row in enumerate(probes):
                 change = beyond(row - error)
                 square = float(change @ change)
-                if not np.isfinite(square) or square < 1e-9:
+                if not np.isfinite(square) or square < NOTHING:
                     continue
                 amount = -float(left @ change) / square
                 if amount < 0.0 and not candidate.signs[i]:
@@ -130,7 +133,7 @@ def _by_trial(
 ) -> list[Move]:
     """Each parameter in one trial alone, with a trend over the trials."""
     count = len(now.box.rows)
-    if count < 3:
+    if count < LEAST_TRIALS:
         return []
     of = np.concatenate(
         [np.full(int(trial.there.sum()), i) for i, trial in enumerate(now.box.rows)]
@@ -145,7 +148,7 @@ def _by_trial(
         for name, column in columns.items():
             change = beyond(column)
             square = float(change @ change)
-            if square > 1e-9:
+            if square > NOTHING:
                 promise = 0.5 * float(left @ change) ** 2 / square
                 moves.append(Move(name, promise, 1, slots=(name,)))
     return moves
@@ -155,5 +158,5 @@ def _odd(now: Hypothesis, moves: Sequence[Move]) -> list[Move]:
     """Each parameter of the trial whose latent force stands out."""
     forces = np.array(now.fit.point.forces)
     odd = int(np.argmax(forces))
-    alone = len(forces) > 2 and forces[odd] > ODD * float(np.median(forces))
+    alone = len(forces) >= LEAST_TRIALS and forces[odd] > ODD * float(np.median(forces))
     return [move for move in moves if alone and move.name.endswith(f"{TRIAL}{odd}")]

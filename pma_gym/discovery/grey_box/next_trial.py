@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from pma_gym.data.trial import Trial
 from pma_gym.data.trial_columns import BY_QUANTITY
 from pma_gym.discovery.experiments.excitation import Excitation
-from pma_gym.discovery.experiments.next_experiment import ENOUGH, LEAST, ExpectedOdds
+from pma_gym.discovery.experiments.next_experiment import ExpectedOdds
 from pma_gym.discovery.experiments.predicted_trials import proposal
 from pma_gym.discovery.grey_box.conclusions import Conclusions
 from pma_gym.discovery.grey_box.effect_fits import tried
@@ -31,6 +31,7 @@ from pma_gym.discovery.grey_box.thresholds import LIKE
 from pma_gym.discovery.report.effect_text import effect_names
 from pma_gym.discovery.report.figure_text import figure, signal_name
 from pma_gym.discovery.result.next_experiment import NextExperiment
+from pma_gym.discovery.thresholds import RESOLVED, SETTLED
 from pma_gym.estimation.innovations import TREND, TRIAL, TURNS, GreyBox, Point, Rows, counted
 from pma_gym.estimation.likelihood_fit import STEP, with_tied, with_values
 from pma_gym.estimation.logged import Logged
@@ -80,9 +81,9 @@ def next_trial(conclusions: Conclusions) -> tuple[NextExperiment | None, str]:
     for reach in REACHES:
         within = [odds for far, odds in expected if far <= reach]
         best = max(within, key=lambda each: each.rank, default=None)
-        if best is not None and best.log_odds >= ENOUGH:
+        if best is not None and best.log_odds >= SETTLED:
             break
-    if best is not None and best.log_odds >= LEAST:
+    if best is not None and best.log_odds >= RESOLVED:
         return proposal(best.excitation, separates, best.log_odds), ""
     apart = f"tell {effect_names(separates)} apart" if separates[1:] else f"show {separates[0]}"
     return None, (

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pma_gym.discovery.grey_box.thresholds import FAINT, LOUD
+from pma_gym.discovery.grey_box.thresholds import FAINT, LOUD, STEP_MISS, STEP_SHARE
 from pma_gym.effects.effect import signals
 from pma_gym.estimation.innovations import GreyBox, Point, Rows
 from pma_gym.estimation.likelihood_fit import Coordinate
@@ -209,12 +209,12 @@ def reading_step(rows: Sequence[Array]) -> float:
     if not len(apart):
         return 0.0
     step = float(np.median(apart[apart < 1.5 * apart.min()]))
-    whole = np.abs(apart / step - np.round(apart / step)) < 0.1
-    return step if whole.mean() > 0.9 else 0.0
+    whole = np.abs(apart / step - np.round(apart / step)) < STEP_MISS
+    return step if whole.mean() > STEP_SHARE else 0.0
 
 
 def white_noise(rows: Sequence[Array]) -> float:
     """Standard deviation of white noise by third differences (squared weights sum to 20)."""
-    third = np.concatenate([np.diff(row, 3) for row in rows if len(row) > 3])
+    third = np.concatenate([np.diff(row, 3) for row in rows if row[3:].size])
     robust = 1.4826 * float(np.median(np.abs(third)))
     return max(robust, 0.3 * float(np.std(third)), 1e-12) / 20**0.5

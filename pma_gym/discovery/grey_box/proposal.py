@@ -16,15 +16,9 @@ from pma_gym.discovery.grey_box.predictions import Predictions
 from pma_gym.discovery.grey_box.prepared_trials import LEAST_FORCE
 from pma_gym.discovery.grey_box.refined_fits import finest
 from pma_gym.discovery.grey_box.slots import gains_of_drive, quantity_of, slot
-from pma_gym.discovery.grey_box.thresholds import (
-    COMPLETE,
-    FAR,
-    LIKE,
-    NOISES,
-    SMALL,
-    SURE,
-)
+from pma_gym.discovery.grey_box.thresholds import FAR, LIKE, NOISES, SMALL
 from pma_gym.discovery.result.misfit import rms
+from pma_gym.discovery.thresholds import COMPLETE, SURE
 from pma_gym.estimation.likelihood_fit import value_of, with_tied, with_values
 
 Array = NDArray[np.float64]

@@ -5,8 +5,8 @@ import numpy as np
 from pma_gym.discovery.grey_box.hypothesis import Move
 from pma_gym.discovery.grey_box.proposal import Proposal
 from pma_gym.discovery.grey_box.slots import path_of, quantity_of
-from pma_gym.discovery.grey_box.thresholds import CONFIDENCE
 from pma_gym.discovery.result.estimates import Estimate, NamedEffect
+from pma_gym.discovery.thresholds import CONFIDENCE
 from pma_gym.estimation.innovations import TREND, TRIAL
 from pma_gym.estimation.likelihood_fit import Fit, value_of
 

@@ -1,6 +1,7 @@
 """The numbers by which the grey box decides, each with its derivation.
 
-Numbers of the numerics stand beside them.
+Those that the method for stations has too are in `discovery/thresholds.py`. Numbers of the numerics
+stand where they are used.
 """
 
 MATERIAL = 0.02
@@ -16,15 +17,6 @@ LIKE = 3.0
 Odds of 20 to 1. Beyond it they are where the difference is within its own scatter.
 """
 
-LEFT = 0.5
-"""Share of the predictions' misfit beyond noise (mean square) that named effects may leave.
-
-They carry at least half.
-"""
-
-MOST_EFFECTS = 3
-"""Effects at most: a beam of more was never right on data whose effects are known (design)."""
-
 TRIED = 5
 """Candidates that are fitted after each screening, the most promising ones."""
 
@@ -33,9 +25,6 @@ HORIZON = 0.25
 
 HORIZON_S = 0.25
 """Longest prediction (s): what a controller of such a rig plans ahead; assumption."""
-
-CONFIDENCE = 1.96
-"""Standard deviations of a 95 % interval."""
 
 ODD = 3.0
 """Times the median of all trials' latent forces from which on a trial stands out."""
@@ -48,9 +37,6 @@ NOISES = 3.0
 
 As the campaign on hidden effects counts it.
 """
-
-SURE = 3.0
-"""Standard errors from none that a size must be for its effect to be named: 1 in 400."""
 
 LOUD = 2.0
 """Times the noise that readings show by their third differences that a fitted noise may have."""
@@ -67,5 +53,9 @@ Assumption: a data sheet or a scale is off by less, so that beyond it the fit be
 SMALL = 0.1
 """Share of the gap (logarithm of the misfit) that an addition closes where much is left."""
 
-COMPLETE = 1.5
-"""Noises that predictions of a complete model miss by at most, as for stations."""
+LEAST_TRIALS = 3
+"""Trials from which on one of them may be the odd one: of two neither is."""
+
+STEP_MISS, STEP_SHARE = 0.1, 0.9
+"""Share of a step that a gap between readings may miss a whole one by, and share of gaps that must
+not for readings to keep to steps. Assumptions."""

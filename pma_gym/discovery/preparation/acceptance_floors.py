@@ -16,23 +16,10 @@ from numpy.typing import NDArray
 
 from pma_gym.data.datasets.dataset import NamedTrial
 from pma_gym.discovery.preparation.noise import rest_readings, step_between
+from pma_gym.discovery.thresholds import ENOUGH_FOR_FLOOR, LOG_ROWS, STILL, TURN_BACK
 from pma_gym.estimation.logged import Logged
 
 Array = NDArray[np.float64]
-
-ENOUGH = 40
-"""Fewest readings at rest, over all trials, whose standard deviation is a floor: it is known to
-11 % then, where the verdict leaves 50 %."""
-
-STILL = 0.05
-"""Share of the readings at rest that turn back, below which they stand still or settle: of noise a
-third of a step high, on average a sixth turn back."""
-
-PLAIN = 0.3
-"""Move from reading to reading, in standard deviations, from which on it counts as one."""
-
-SUMMARY = 50
-"""Readings a trial below which a signal is a summary, as a table's rows are."""
 
 REPEATS, TOLERANCE, NOISE = "repeats", "tolerance", "readings' noise"
 REST, ERRORS = "rest segments", "standard errors"
@@ -117,19 +104,19 @@ def is_summary(parts: Sequence[Array]) -> bool:
     Args:
         parts: its readings or residuals in each trial, NaN where there is none.
     """
-    return max((int(np.isfinite(part).sum()) for part in parts), default=0) < SUMMARY
+    return max((int(np.isfinite(part).sum()) for part in parts), default=0) < LOG_ROWS
 
 
 def _rest(logged: Sequence[Logged], channel: int) -> float | None:
     """Noise in rest segments (SI); None where there are few readings, or where they stand still."""
     segments = [part[np.isfinite(part)] for part in rest_readings(logged, channel)]
     count = sum(len(part) for part in segments)
-    if count < ENOUGH:
+    if count < ENOUGH_FOR_FLOOR:
         return None
     # What still settles bends away from a line.
     squares = sum(float(np.sum(_about_parabola(part) ** 2)) for part in segments)
     level = float(np.sqrt(squares / (count - 3 * len(segments))))
-    if sum(_turns(part, PLAIN * level) for part in segments) < STILL * count:
+    if sum(_turns(part, TURN_BACK * level) for part in segments) < STILL * count:
         return None
     return max(level, step_between(logged, channel) / np.sqrt(12.0))
 

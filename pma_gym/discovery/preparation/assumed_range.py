@@ -8,16 +8,9 @@ What the catalogue allows (a mass above 0) is never left.
 import numpy as np
 from numpy.typing import NDArray
 
+from pma_gym.discovery.thresholds import FARTHEST, MOST_DOUBLINGS
+
 Array = NDArray[np.float64]
-
-FARTHEST = 6.0
-"""Standard deviations of what is assumed beforehand that a parameter may go away from it."""
-
-LEAST_GAIN = 4.0
-"""Fall of chi-square that doubling a range must bring: twice a log-likelihood of 2."""
-
-MOST_DOUBLINGS = 5
-"""How often a range is doubled at most."""
 
 AT_EDGE = 1e-9
 """Distance from an edge, as a share of the range, within which a value is at the edge."""

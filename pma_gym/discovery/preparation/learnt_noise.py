@@ -22,29 +22,18 @@ from pma_gym.discovery.preparation.nuisance_projection import (
     half_periods,
     line_columns,
 )
+from pma_gym.discovery.thresholds import (
+    DRIFT_CHANCE,
+    DRIFT_ENLARGED,
+    ENOUGH_FOR_COLOUR,
+    LEAST_CHANGE,
+    MOST_MISSING,
+    MOST_WAVES,
+    WAVE_CHANCE,
+)
 from pma_gym.estimation.logged import Logged
 
 Array = NDArray[np.float64]
-
-ENOUGH_ALIKE = 400
-"""Least number of readings in repeats, or at rest, from which the colour of noise is learnt."""
-
-CHANCE = 1e-3
-"""That noise without a drift is taken for one with a drift, over all signals."""
-
-UNSURE = 2.0
-"""By what a drift that repeats tell is enlarged: a pair of them tells its size to a factor of two,
-and too small a size leaves a drift that looks like the rig's."""
-
-LEAST_DRIFT = 0.15
-"""Drift (rms) in standard deviations of the noise, below which it counts as none."""
-
-MOST_MISSING = 0.1
-"""Share of readings that may be missing in repeats, outliers that were set aside say."""
-
-MOST_WAVES, WAVE_CHANCE = 6, 1e-4
-"""Most half waves of a drift in a trial, and the chance that noise has one that commands do not
-leave free."""
 
 NEAR = 16
 """Neighbours above a drift's cosines that tell how much noise without drift has there."""
@@ -65,15 +54,15 @@ def learnt_noise(
     ]
     learnt = []
     drifts = [_drift(logged, pairs, channel, each.level) for channel, each in enumerate(noise)]
-    surely = any(each.chance < CHANCE / len(noise) for each in drifts)
+    surely = any(each.chance < DRIFT_CHANCE / len(noise) for each in drifts)
     shares = [each.share for each in drifts if np.isfinite(each.share)]
     usual = float(np.sqrt(np.mean(np.square(shares)))) if shares else 0.0
     for channel, before in enumerate(noise):
         waves, share = drifts[channel].waves, 0.0
         if surely and np.isfinite(drifts[channel].share):
             # One pair of repeats tells a size badly; drifts of one rig's sensors are alike.
-            share = UNSURE * max(usual, drifts[channel].share)
-        is_drifting = share > LEAST_DRIFT
+            share = DRIFT_ENLARGED * max(usual, drifts[channel].share)
+        is_drifting = share > LEAST_CHANGE
         after = _coloured(before, logged, pairs, channel, waves, is_drifting)
         if is_drifting:
             after = replace(after, drift=share * before.level, waves=waves)
@@ -94,9 +83,9 @@ def _coloured(
         _noise_of_pair(logged, i, j, channel, before.lines, waves, is_drifting) for i, j in pairs
     ]
     parts = [part for part in parts if part.size]
-    if sum(int(np.isfinite(part).sum()) for part in parts) < ENOUGH_ALIKE:
+    if sum(int(np.isfinite(part).sum()) for part in parts) < ENOUGH_FOR_COLOUR:
         parts = rest_readings(logged, channel)
-        if before.lines or sum(int(np.isfinite(part).sum()) for part in parts) < ENOUGH_ALIKE:
+        if before.lines or sum(int(np.isfinite(part).sum()) for part in parts) < ENOUGH_FOR_COLOUR:
             return before
     return replace(autoregression(parts, before.level), lines=before.lines)
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.stats import f as fisher
 
 from pma_gym.discovery.preparation.noise import Whitening
-from pma_gym.discovery.preparation.nuisance_projection import WANDER
+from pma_gym.discovery.thresholds import LEAST_ALIAS_HZ, LEAST_HARMONIC, LINE_CHANCE, SLIGHT, WANDER
 from pma_gym.estimation.logged import Logged
 
 Array = NDArray[np.float64]
@@ -31,21 +31,14 @@ whole one passes a line by."""
 BESIDE_HZ = np.array([-2.5, -2.1, -1.7, -1.3, 1.3, 1.7, 2.1, 2.5])
 """Where the residual beside a line is taken (Hz from it)."""
 
-LEAST_ALIAS_HZ = 4.0
-"""Alias below which a line is not looked for: commands excite the rig there."""
+SAME_HZ = 1e-9
+"""Difference of two frequencies that are one (Hz): rounding."""
 
 SLOW = 6
 """Powers of the time, from 0 on, that are slow."""
 
 FINER = 41
 """Frequencies that are tried about the best of those steps."""
-
-CHANCE = 1e-5
-"""That noise is taken for a line, for one signal and one frequency."""
-
-LEAST_SIZE, LEAST_HARMONIC = 0.1, 0.02
-"""Line (rms) in standard deviations of the noise, below which it counts as none; and one beside
-another of the same mains, which repeats for as long as the trial and adds up in autocorrelation."""
 
 
 def with_lines(
@@ -69,11 +62,11 @@ def with_lines(
         for harmonic in HARMONICS:
             for channel, each in enumerate(noise):
                 hertz = harmonic * base
-                if any(abs(hertz - other) < 1e-9 for other in lines[channel]):
+                if any(abs(hertz - other) < SAME_HZ for other in lines[channel]):
                     continue
                 size, chance = _line(hertz, logged, [part[channel] for part in left])
-                least = LEAST_HARMONIC if named[channel] else LEAST_SIZE
-                if chance < CHANCE and size > least * each.level:
+                least = LEAST_HARMONIC if named[channel] else SLIGHT
+                if chance < LINE_CHANCE and size > least * each.level:
                     lines[channel].append(hertz)
                     powers[channel] += size**2
                     named[channel] = True

@@ -15,35 +15,23 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_toeplitz
 
+from pma_gym.discovery.thresholds import (
+    ENOUGH_FOR_NOISE,
+    FIRST_REST_S,
+    LEAST_REST,
+    LEAST_SEGMENTS,
+    MISS,
+    MOVING_SPREAD,
+    QUIETEST,
+    REST_S,
+    SLOW_S,
+)
 from pma_gym.estimation.logged import Logged
 
 Array = NDArray[np.float64]
 
-REST_S = 0.6
-"""How long commands must have been constant before a segment counts as rest (s): some six time
-constants of the regulator."""
-
-FIRST_REST_S = 0.1
-"""The same at the beginning of a trial, which begins settled."""
-
-LEAST_REST = 12
-"""Fewest readings of a segment."""
-
-LEAST_SEGMENTS = 3
-"""Least number of segments that show which of them are at rest."""
-
-MOVING, QUIETEST = 4.0, 3.0
-"""Spread of a segment in which something moves, over that of quiet ones; and of the quiet ones over
-the quietest, at most. Both are assumptions."""
-
 STUCK = 1e-9
 """Spread of readings that stand still, as a share of the largest: arithmetic's."""
-
-ENOUGH = 120
-"""Fewest readings at rest, over all trials, from which a noise level is taken."""
-
-SLOW_S = (0.06, 0.15)
-"""Lags (s) over which a residual still resembles itself only where the model is wrong."""
 
 USUAL, USUAL_SQUARE = 0.98, 0.8735
 """Share of differences that is noise for certain, and mean square of such a share of normal
@@ -51,6 +39,9 @@ numbers, the smallest."""
 
 MOST_STEPS = 4e6
 """Most steps in a signal's span that are seen: an encoder of 50 nm over 0.2 m."""
+
+LEAST_DISTINCT = 4
+"""Fewest different readings that tell a step."""
 
 MOST_ORDER = 6
 """Highest order of an autoregression."""
@@ -154,14 +145,14 @@ def _quiet_segments(stretches: list[Array]) -> list[Array]:
     quiet = float(np.sqrt(np.average(spreads[half] ** 2, weights=counts[half])))
     # Were most of the readings in motion, their quieter half would be none.
     quiet = min(quiet, QUIETEST * float(spreads[order[0]]))
-    most = MOVING * max(quiet, level_of_neighbours(stretches))
+    most = MOVING_SPREAD * max(quiet, level_of_neighbours(stretches))
     return [part for part, spread in zip(stretches, spreads, strict=True) if spread <= most]
 
 
 def level_at_rest(segments: Sequence[Array]) -> float | None:
     """Standard deviation of rest segments (SI), or None where there are too few readings."""
     count = sum(int(np.isfinite(part).sum()) for part in segments)
-    if count < ENOUGH:
+    if count < ENOUGH_FOR_NOISE:
         return None
     squares = sum(float(np.nansum(part**2)) for part in segments)
     return float(np.sqrt(squares / (count - 2 * len(segments))))
@@ -178,7 +169,7 @@ def level_of_neighbours(parts: Sequence[Array]) -> float:
     """
     bends = np.concatenate([np.diff(part, 3) for part in parts] or [np.empty(0)])
     bends = bends[np.isfinite(bends)]
-    if bends.size < ENOUGH:
+    if bends.size < ENOUGH_FOR_NOISE:
         return 0.0
     squares = np.sort(bends**2)[: int(USUAL * bends.size)]
     # 1, 3, 3, 1: the sum of squares is 20.
@@ -200,7 +191,7 @@ def autoregression(parts: Sequence[Array], level: float) -> Whitening:
         count += int(np.isfinite(part).sum())
         for lag in range(min(MOST_ORDER + 1, len(series))):
             lags[lag] += series[: len(series) - lag] @ series[lag:]
-    if count < ENOUGH or lags[0] <= 0.0:
+    if count < ENOUGH_FOR_NOISE or lags[0] <= 0.0:
         return white_noise(level)
     if sparse(parts):
         return white_noise(max(level, float(np.sqrt(lags[0] / count))))
@@ -241,7 +232,7 @@ def distinct_readings(trials: Sequence[Logged], channel: int) -> Array:
 def step_between(trials: Sequence[Logged], channel: int) -> float:
     """Smallest step between readings (SI), where they keep to whole steps; else 0."""
     distinct = distinct_readings(trials, channel)
-    if len(distinct) < 4:
+    if len(distinct) < LEAST_DISTINCT:
         return 0.0
     gaps = np.diff(distinct)
     span = float(distinct[-1] - distinct[0])
@@ -255,7 +246,7 @@ def step_between(trials: Sequence[Logged], channel: int) -> float:
     whole = (distinct - distinct[0]) / step
     miss = np.abs(whole - np.round(whole))
     # Readings in files are rounded to some digits: a hundredth of a step may be lost.
-    return step if float(np.max(miss)) < 0.05 else 0.0
+    return step if float(np.max(miss)) < MISS else 0.0
 
 
 def slow_part(parts: Sequence[Array], rate_hz: float, level: float = 0.0) -> float:

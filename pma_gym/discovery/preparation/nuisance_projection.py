@@ -18,17 +18,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pma_gym.discovery.preparation.noise import Whitening
+from pma_gym.discovery.thresholds import LEAST_HALVES, MOST_HALVES, MOST_TURNS, SLOW_SHARE, WANDER
 from pma_gym.estimation.logged import Logged
 
 Array = NDArray[np.float64]
-
-LEAST_HALVES, MOST_HALVES = 3, 4
-"""Least and greatest number of half periods of a drift in a trial; the least hold one period and a
-half of any phase."""
-
-WANDER, MOST_TURNS = 4e-4, 24
-"""How far a line's frequency is off in a trial, as a share of it, and how many half turns of that a
-trial gives it at most. An assumption: the frequency of mains changes by 20 mHz."""
 
 STEADY = 0.25
 """Half turns by which a line's frequency may be off in a trial and leave a fifth of it."""
@@ -36,14 +29,11 @@ STEADY = 0.25
 LEAKS = 2
 """Half turns beyond those that a line's wandering may have."""
 
-SLOW_SHARE = 0.1
-"""Share of a command's variance below its slowest excited frequency."""
-
 MOST_BYTES = 2**27
 """Memory of the projections that are kept: candidates of one diagnosis share them."""
 
 LEAST_PART = 1e-6
-"""Part of a column that others must leave, or it is one of theirs."""
+"""Part of a column, or of a probe's change, that others must leave, or it is one of theirs."""
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,8 @@ from pma_gym.data.quality import clipping
 from pma_gym.data.quality.lone_readings import without_lone_readings
 from pma_gym.data.signals import SIGNALS
 from pma_gym.data.trial import Trial
-from pma_gym.discovery.preparation.splits import FOLDS, stretches
+from pma_gym.discovery.preparation.splits import stretches
+from pma_gym.discovery.thresholds import FOLDS
 from pma_gym.plant import sensors
 from pma_gym.plant.model import Model
 

@@ -5,27 +5,10 @@ from collections.abc import Sequence
 from pma_gym.data.trial_columns import BY_QUANTITY
 from pma_gym.discovery.preparation.initial_floors import Level
 from pma_gym.discovery.result.estimates import Estimate, NamedEffect
+from pma_gym.discovery.thresholds import COARSER, DITHER, HIDDEN, MISS, STEP_CHANCE
 from pma_gym.units import SI_FACTORS
 
-COARSER = 1.5
-"""How many of the steps that a sensor should have make a step coarse."""
-
 NAME = "sensor_quantisation"
-MISS = 0.05
-"""Share of a step that a reading may miss a whole one by; over all steps between the least and the
-largest reading, of which there are at least as many as differ, that is what the step may be off."""
-
-HIDDEN = 1.0
-"""Noise hides a step if its standard deviation, rounding included, is this many steps or more: what
-rounding adds to such readings is noise like any other."""
-
-DITHER = 0.3
-"""Noise before rounding, in steps, that makes an error of rounding noise as well: nobody need know
-which step the sensor should have."""
-
-CHANCE = 0.1
-"""Of a reading that lies within a twentieth of a step from a whole one by chance. Two readings make
-the step; every other that differs from them has to keep to it."""
 
 
 def is_coarse(floor: Level) -> bool:
@@ -68,4 +51,4 @@ def coarse_sensors(
             size = floor.step / SI_FACTORS[column.unit]
             sure = MISS * size / max(floor.distinct - 1, 1)
             steps[f"{column.name}_step"] = Estimate(size, size - sure, size + sure, column.unit)
-    return (NamedEffect(NAME, (), max(CHANCE**others, 1e-300), steps),) if steps else ()
+    return (NamedEffect(NAME, (), max(STEP_CHANCE**others, 1e-300), steps),) if steps else ()

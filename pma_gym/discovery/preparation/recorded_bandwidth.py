@@ -5,10 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from pma_gym.data.trial import Trial
+from pma_gym.discovery.thresholds import RECORDED
 from pma_gym.plant.model import Model
-
-RECORDED = 0.4
-"""Bandwidth of a motion over the rows in a second that record it, at most: half would be none."""
 
 BANDWIDTH = "imposed_motion.bandwidth_hz"
 """Path of an imposed motion's bandwidth."""

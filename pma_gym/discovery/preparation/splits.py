@@ -6,15 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pma_gym.data.trial import Trial
-
-FOLDS = 6
-"""Parts that trials are divided into; each is left out once."""
-
-LONG_S = 20.0
-"""A single trial of this length (s) or more has stretches that can be left out."""
-
-STRETCH_S = 5.0
-"""About how long such a stretch is (s): longer than the memory of the rig."""
+from pma_gym.discovery.thresholds import FOLDS, LONG_S, STRETCH_S
 
 
 def folds(count: int, files: Sequence[str] = ()) -> list[list[int]]:

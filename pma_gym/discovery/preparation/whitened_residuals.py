@@ -22,6 +22,7 @@ from pma_gym.discovery.preparation.assumed_range import (
 )
 from pma_gym.discovery.preparation.noise import Whitening
 from pma_gym.discovery.preparation.nuisance_projection import Projection, projection
+from pma_gym.discovery.thresholds import INDEPENDENT_S
 from pma_gym.estimation.logged import Logged
 from pma_gym.estimation.simulated_trials import SimulatedTrials
 from pma_gym.plant.model import Model
@@ -30,10 +31,6 @@ Array = NDArray[np.float64]
 
 ROWS = 256
 """Rows in one product of matrices: few enough that no BLAS shares it between threads."""
-
-PIECE_S = 0.25
-"""How long a piece is (s): longer than what whitening leaves of the noise's memory, and so short
-that what shows for a second or two still makes more than a handful of pieces."""
 
 
 @dataclass(frozen=True)
@@ -313,7 +310,7 @@ class WhitenedResiduals(SimulatedTrials):
     def edges(self, logged: Logged) -> list[int]:
         """Where the pieces of a trial begin, and its end."""
         duration = float(logged.time[-1] - logged.time[0])
-        count = max(1, min(round(duration / PIECE_S), len(logged.time) // 4))
+        count = max(1, min(round(duration / INDEPENDENT_S), len(logged.time) // 4))
         return [round(k * len(logged.time) / count) for k in range(count + 1)]
 
     def _products(self, logged: Logged, white: Array) -> Array:

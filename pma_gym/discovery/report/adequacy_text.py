@@ -1,17 +1,11 @@
 """What is left of the signals in sentences: how many floors, and which log would decide."""
 
 from pma_gym.discovery.diagnosis import Diagnosis
-from pma_gym.discovery.preparation.acceptance_floors import (
-    ENOUGH,
-    ERRORS,
-    NOISE,
-    REPEATS,
-    REST,
-    TOLERANCE,
-)
+from pma_gym.discovery.preparation.acceptance_floors import ERRORS, NOISE, REPEATS, REST, TOLERANCE
 from pma_gym.discovery.report.figure_text import figure, listed, signal_name, signal_unit
 from pma_gym.discovery.result.noise import Judgement
-from pma_gym.discovery.verdict.adequacy import LEAST_BLOCKS, MOST_EXPLAINED, MOST_FLOORS, OPEN
+from pma_gym.discovery.thresholds import COMPLETE, ENOUGH_FOR_FLOOR, LEAST_BLOCKS, MOST_EXPLAINED
+from pma_gym.discovery.verdict.adequacy import OPEN
 
 FLOORS = {
     REPEATS: "the scatter between repeats",
@@ -70,8 +64,8 @@ def undecided(diagnosis: Diagnosis) -> str:
         return (
             f"{name} has neither a repeat, a rest segment nor a tolerance that its misfit could be "
             f"judged by; log one of the trials twice, or a trial that holds its commands for some "
-            f"seconds ({ENOUGH} readings or more at rest), or state the misfit that is good "
-            f"enough in dataset.toml: [tolerance], {signal} = a number in {unit}"
+            f"seconds ({ENOUGH_FOR_FLOOR} readings or more at rest), or state the misfit that is "
+            f"good enough in dataset.toml: [tolerance], {signal} = a number in {unit}"
         )
     if judged.fault == "not left out":
         return (
@@ -100,7 +94,7 @@ def undecided(diagnosis: Diagnosis) -> str:
     )
     return (
         f"{what}, although a fit to all trials leaves {figure(judged.fitted, 2)} (at most "
-        f"{MOST_FLOORS:g} may be left): the other trials do not determine the parameters; log more "
+        f"{COMPLETE:g} may be left): the other trials do not determine the parameters; log more "
         "trials with commands like these"
     )
 

@@ -4,12 +4,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from pma_gym.discovery.preparation.learnt_noise import UNSURE
 from pma_gym.discovery.preparation.mains_lines import line_size
 from pma_gym.discovery.report.figure_text import figure, listed, signal_name
 from pma_gym.discovery.result.noise import Nuisance
 from pma_gym.discovery.screening.residuals import simulated_less_measured
 from pma_gym.discovery.screening.scan_statistic import autocorrelation
+from pma_gym.discovery.thresholds import DRIFT_ENLARGED
 from pma_gym.discovery.verdict.findings import Findings
 
 LEAST_COLOUR = 0.2
@@ -36,7 +36,7 @@ def nuisances(findings: Findings) -> tuple[Nuisance, ...]:
             size = line_size(hertz, whitened.logged, parts) / noise.level
             lines.setdefault(round(hertz, 6), {})[column] = size
         if noise.drift:
-            drifts[column] = noise.drift / UNSURE / noise.level
+            drifts[column] = noise.drift / DRIFT_ENLARGED / noise.level
         if noise.coefficients:
             correlation = float(autocorrelation(noise, 2)[1])
             if abs(correlation) > LEAST_COLOUR:

@@ -20,7 +20,7 @@ from pma_gym.discovery.report.figure_text import (
 from pma_gym.discovery.result.estimates import Moved, NamedEffect
 from pma_gym.discovery.result.misfit import Gap, Place
 from pma_gym.discovery.result.noise import Floor, Judgement
-from pma_gym.discovery.verdict.adequacy import MOST_EXPLAINED, MOST_FLOORS
+from pma_gym.discovery.thresholds import COMPLETE, MOST_EXPLAINED
 from pma_gym.pages.document import TextTable
 
 
@@ -83,7 +83,7 @@ def adequacy_table(judgements: Mapping[str, Judgement]) -> TextTable:
         )
     header = ["Signal", "Noise floor", "Misfit, fitted readings", "Misfit, readings left out"]
     title = (
-        f"Misfit of the proposed model in noise floors: at most {MOST_FLOORS:g}, of which a "
+        f"Misfit of the proposed model in noise floors: at most {COMPLETE:g}, of which a "
         f"regression on state and command explains less than {MOST_EXPLAINED:g}"
     )
     return TextTable(title, [*header, "Explained by a regression", "Verdict"], rows, words=2)

@@ -1,15 +1,12 @@
 """The verdict `unknown` in words: what the best effects leave, and the figure beyond its limit."""
 
 from pma_gym.discovery.diagnosis import Diagnosis
-from pma_gym.discovery.report.approximate_text import left_text
+from pma_gym.discovery.report.approximate_text import MANY, left_text
 from pma_gym.discovery.report.effect_text import effect_name, effect_names
 from pma_gym.discovery.report.figure_text import figure, percent, signal_name
 from pma_gym.discovery.report.size_text import sized_effects
 from pma_gym.discovery.verdict.residual_laws import LAWS
 from pma_gym.discovery.verdict.unknown import Reason
-
-MANY = 10.0
-"""Times itself from which on the scatter of a size is no longer given in numbers."""
 
 _WHAT = "what is slow in"
 

@@ -22,9 +22,9 @@ from pma_gym.discovery.report.noise_text import nuisance_text
 from pma_gym.discovery.report.size_text import sized_effects
 from pma_gym.discovery.report.unknown_text import unknown_sentence
 from pma_gym.discovery.result.candidate import ADDED
-from pma_gym.discovery.selection.backward_elimination import ODDS
+from pma_gym.discovery.thresholds import OFF_ODDS, SAME_PARAMETERS, SLIGHT, UNDETECTABLE_SHARE
 from pma_gym.discovery.verdict.adequacy import OPEN
-from pma_gym.discovery.verdict.decision import MOVED_CHANGE, UNDETECTABLE_SHARE, is_ambiguous
+from pma_gym.discovery.verdict.decision import is_ambiguous
 from pma_gym.discovery.verdict.findings import Findings
 from pma_gym.discovery.verdict.residual_fraction import ResidualFraction
 from pma_gym.discovery.verdict.unknown import Reason
@@ -38,9 +38,6 @@ VERDICTS = {
     "undecidable": "Undecidable from these data",
 }
 """Each verdict in a few words."""
-
-ALIKE = 0.9
-"""Correlation from which on two parameters do the same to the signals."""
 
 
 def sentence(diagnosis: Diagnosis, unknown: Reason | None = None) -> str:
@@ -208,7 +205,7 @@ def twin(path: str, fit: Fitted) -> str | None:
         alike = np.abs(fit.covariance[at] / (spread * spread[at]))
     alike[at] = 0.0
     alike = np.where(np.isfinite(alike), alike, 0.0)
-    return fit.paths[int(np.argmax(alike))] if alike.max(initial=0.0) > ALIKE else None
+    return fit.paths[int(np.argmax(alike))] if alike.max(initial=0.0) > SAME_PARAMETERS else None
 
 
 def steps(findings: Findings, diagnosis: Diagnosis, left: ResidualFraction) -> tuple[str, ...]:
@@ -266,12 +263,12 @@ def _named(count: int, free: int, verdict: Verdict) -> str:
         return f"Parameters that are off: none of {free} is needed to explain these trials."
     said = (
         f"Parameters that are off: {count} of {free} {'is' if count == 1 else 'are'} needed to "
-        f"explain these trials, by odds of {ODDS:g} to 1 or more if the others are as they were "
-        "given. "
+        f"explain these trials, by odds of {OFF_ODDS:g} to 1 or more if the others are as they "
+        "were given. "
     )
     if verdict == "agrees":
         return said + (
-            f"But with all refitted the signals change by less than {MOVED_CHANGE:g} of the noise: "
+            f"But with all refitted the signals change by less than {SLIGHT:g} of the noise: "
             "the model stays as it was given."
         )
     return said + (

@@ -11,25 +11,19 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pma_gym.discovery.preparation.noise import ENOUGH, SLOW_S
+from pma_gym.discovery.thresholds import (
+    CERTAIN,
+    ENOUGH_FOR_NOISE,
+    LEAST_AUTOCORRELATION,
+    LONGEST_LAG_S,
+    SLOW_S,
+    TONE_HZ,
+    TONE_PERIODS,
+    TONE_SHARE,
+    TONE_WIDTH,
+)
 
 Array = NDArray[np.float64]
-
-LONGEST_S = 0.6
-"""Longest lag (s) that is looked at."""
-
-SURE = 6.0
-"""Standard errors of the largest autocorrelation that chance does not reach, over all lags."""
-
-LEAST = 0.025
-"""Autocorrelation below which the autocorrelated part is smaller than 0.16 of the noise."""
-
-SLOWEST_HZ, WIDTH, MOSTLY = 0.4, 0.25, 0.7
-"""A tone's least frequency (Hz), for slower than that every trial is one swing; half its width as a
-share of it; the least share of the autocorrelation that makes a tone."""
-
-LEAST_PERIODS = 2.0
-"""Least number of a tone's periods in the longest part: what a piece leaves may swing once."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +43,7 @@ class AutocorrelationTest:
     @property
     def sure(self) -> bool:
         """Whether it is more than chance, and large enough to matter."""
-        return self.share > LEAST and self.score > SURE
+        return self.share > LEAST_AUTOCORRELATION and self.score > CERTAIN
 
 
 def autocorrelation_test(parts: Sequence[Array], rate_hz: float) -> AutocorrelationTest:
@@ -61,17 +55,17 @@ def autocorrelation_test(parts: Sequence[Array], rate_hz: float) -> Autocorrelat
     """
     series = [np.where(np.isfinite(part), part, 0.0) for part in parts]
     there = [np.isfinite(part).astype(float) for part in parts]
-    first, last = max(1, round(SLOW_S[0] * rate_hz)), max(1, round(LONGEST_S * rate_hz))
+    first, last = max(1, round(SLOW_S[0] * rate_hz)), max(1, round(LONGEST_LAG_S * rate_hz))
     sums, counts = np.zeros(last + 1), np.zeros(last + 1)
     for values, known in zip(series, there, strict=True):
         for lag in range(min(last + 1, len(values))):
             size = len(values) - lag
             sums[lag] += values[:size] @ values[lag:]
             counts[lag] += known[:size] @ known[lag:]
-    if counts[0] < ENOUGH or sums[0] <= 0.0:
+    if counts[0] < ENOUGH_FOR_NOISE or sums[0] <= 0.0:
         return AutocorrelationTest(0.0, 0.0, 0.0)
     variance = sums[0] / counts[0]
-    enough = counts >= 0.5 * ENOUGH
+    enough = counts >= 0.5 * ENOUGH_FOR_NOISE
     shares = np.where(enough, sums / np.maximum(counts, 1.0) / variance, 0.0)
     own = 1.0 + 2.0 * float(np.sum(shares[1:first] ** 2))
     scores = np.abs(shares[first:]) * np.sqrt(counts[first:] / own)
@@ -110,13 +104,13 @@ def tone(parts: Sequence[Array], rate_hz: float) -> Tone | None:
         power += np.abs(np.fft.rfft(np.where(np.isfinite(part), part, 0.0), size)) ** 2
     power *= 2.0 / size / count
     hertz = np.arange(len(power)) * rate_hz / size
-    slowest = max(SLOWEST_HZ, LEAST_PERIODS * rate_hz / size)
+    slowest = max(TONE_HZ, TONE_PERIODS * rate_hz / size)
     peak = int(np.argmax(np.where(hertz < slowest, 0.0, power)))
     away = np.abs(hertz - hertz[peak])
-    near = away < WIDTH * hertz[peak]
+    near = away < TONE_WIDTH * hertz[peak]
     # Noise with a memory is not of one level; about the peak it nearly is.
-    floor = np.median(power[away < max(2.0 * WIDTH * hertz[peak], 4.0 * hertz[1])])
+    floor = np.median(power[away < max(2.0 * TONE_WIDTH * hertz[peak], 4.0 * hertz[1])])
     inside = float(np.sum(power[near] - floor))
-    if peak == 0 or inside < MOSTLY * kept.share * kept.variance:
+    if peak == 0 or inside < TONE_SHARE * kept.share * kept.variance:
         return None
     return Tone(float(hertz[peak]), float(np.sqrt(inside)))

@@ -105,7 +105,7 @@ def _lacking(
     if effect.name in model.parameters or effect.replaces or effect.neutral is None:
         return None
     counted = "repeat" in effect.quantities
-    if counted and (orders is None or len(set(orders)) < 2):
+    if counted and (orders is None or len(set(orders)) <= 1):
         return None
     output = measured_output(effect.port)
     if effect.port not in model.rig.ports and not output:

@@ -19,16 +19,22 @@ from pma_gym.data.signals import Signal
 from pma_gym.discovery.fitting.fit_problem import Fitted
 from pma_gym.discovery.preparation.whitened_residuals import WhitenedResiduals
 from pma_gym.discovery.result.misfit import Map, Place
-from pma_gym.discovery.screening.regions import (
-    LARGEST,
-    SMALLEST,
-    Region,
-    level_axes,
-    single_regions,
-)
+from pma_gym.discovery.screening.regions import Region, level_axes, single_regions
 from pma_gym.discovery.screening.residual_maps import residual_map
 from pma_gym.discovery.screening.residuals import simulated_less_measured
 from pma_gym.discovery.screening.time_bins import PIECE_BINS, TimeBins, time_bins
+from pma_gym.discovery.thresholds import (
+    LARGEST_REGION,
+    LEAST_LIFT,
+    LEAST_SHARE,
+    MOST_OF_A_SIGNAL,
+    MOST_REGIONS,
+    OVERLAP,
+    SECOND_WORTH,
+    SIGNIFICANT,
+    SMALLEST_REGION,
+    VISIBLE,
+)
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -36,24 +42,6 @@ Single = NDArray[np.float32]
 
 RESAMPLES = 999
 """Deals for p-values."""
-
-SIGNIFICANT = 0.05
-"""Largest p-value of a region that is told."""
-
-MOST_OF_A_SIGNAL, MOST = 3, 8
-"""Regions that are told at most."""
-
-LEAST_SHARE, LEAST_LIFT = 0.15, 1.25
-"""Least share of the gap in a region that is told, and how many times its share of readings."""
-
-SECOND_WORTH = 1.15
-"""How many times the score of either must be that of two conditions together."""
-
-OVERLAP = 0.5
-"""Share of a region's gap that may lie in another that is told already."""
-
-VISIBLE = 1.05
-"""Mean square of a residual, in units of the noise's, from which there is a gap."""
 
 
 def localise(
@@ -117,7 +105,7 @@ def _places(
             signal = signals[channel].column
             places.append(Place(signal, words, float(share[k]), float(p_value[k])))
     places.sort(key=lambda place: -place.share_of_gap)
-    return tuple(places[:MOST])
+    return tuple(places[:MOST_REGIONS])
 
 
 def _shares(bins: TimeBins, channel: int, member: Single) -> tuple[Array, Array]:
@@ -171,8 +159,8 @@ def _shown(
     alone = np.array([max(single[i] for i in name) if len(name) > 1 else 0.0 for name in names])
     good = (
         (p_value <= SIGNIFICANT)
-        & (readings >= SMALLEST)
-        & (readings <= LARGEST)
+        & (readings >= SMALLEST_REGION)
+        & (readings <= LARGEST_REGION)
         & (share >= np.maximum(LEAST_SHARE, LEAST_LIFT * readings))
         & (score >= SECOND_WORTH * alone)
     )

@@ -12,14 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
+from pma_gym.discovery.preparation.nuisance_projection import LEAST_PART
 from pma_gym.discovery.preparation.whitened_residuals import WhitenedResiduals
 
 Array = NDArray[np.float64]
 
-LEAST_PART = 1e-6
-"""Share of a probe's change that parameters must leave, or it is one of theirs."""
-
-LEAST_CHANGE = 1e-3
+SMALLEST_CHANGE = 1e-3
 """Root mean square of a probe's change in standard deviations of the noise, at least: what is less
 may be steps of the integrator that rounding made fall otherwise."""
 
@@ -101,7 +99,7 @@ def probe_scores(
             slopes_by_trial.append(np.add.reduceat(slopes, edges, axis=1))
     weights = baseline.inverse @ across
     strengths = whole - np.sum(across * weights, axis=0)
-    seen = (strengths > LEAST_PART * whole) & (whole > LEAST_CHANGE**2 * readings)
+    seen = (strengths > LEAST_PART * whole) & (whole > SMALLEST_CHANGE**2 * readings)
     strengths = np.where(seen, strengths, 0.0)
     joined = np.concatenate(along, axis=1)
     slopes = joined - weights.T @ np.concatenate(own, axis=1)

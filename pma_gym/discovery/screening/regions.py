@@ -8,12 +8,10 @@ from numpy.typing import NDArray
 
 from pma_gym.data.signals import Signal
 from pma_gym.discovery.screening.time_bins import TimeBins
+from pma_gym.discovery.thresholds import LARGEST_REGION, SMALLEST_REGION
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
-
-SMALLEST, LARGEST = 0.02, 0.9
-"""Shares of a signal's readings between which a region is one."""
 
 
 @dataclass(frozen=True)
@@ -92,7 +90,7 @@ def single_regions(bins: TimeBins, levels: Sequence[Axis]) -> list[Region]:
     phases = ("before the first command", "between the first command and the last", "")
     for number, words in enumerate(phases[:2]):
         named.append(("phase", words, bins.phase == number))
-    named.append(("phase", "in the final hold", bins.phase == 2.0))
+    named.append(("phase", "in the final hold", bins.phase > 1.0))
     for axis in levels:
         values = getattr(bins, axis.kind)
         # A pressure is known by its unit.
@@ -100,12 +98,12 @@ def single_regions(bins: TimeBins, levels: Sequence[Axis]) -> list[Region]:
         for cut in _round_cuts(values[there], (0.2, 0.4, 0.6, 0.8)):
             named.append((axis.kind, f"{name}above {cut:g} {axis.unit}", values > cut))
             named.append((axis.kind, f"{name}under {cut:g} {axis.unit}", values < cut))
-    named.append(("order", "in the first half of the trials", bins.order < 0.5))
-    named.append(("order", "in the second half of the trials", bins.order > 0.5))
+    named.append(("order", "in the first half of the trials", 2.0 * bins.order < 1.0))
+    named.append(("order", "in the second half of the trials", 2.0 * bins.order > 1.0))
     count = int(there.sum())
     kept = {}
     for kind, words, inside in named:
-        if SMALLEST * count <= inside.sum() <= LARGEST * count:
+        if SMALLEST_REGION * count <= inside.sum() <= LARGEST_REGION * count:
             # Of two ways to say the same, the first.
             kept.setdefault(inside.tobytes(), Region((kind,), words, inside))
     return list(kept.values())

@@ -12,15 +12,9 @@ from pma_gym.discovery.preparation.noise import Whitening, autoregression, step_
 from pma_gym.discovery.preparation.whitened_residuals import WhitenedResiduals
 from pma_gym.discovery.screening.autocorrelation import AutocorrelationTest, autocorrelation_test
 from pma_gym.discovery.screening.scan_statistic import NO_EXCESS, ScanStatistic, scan_statistic
+from pma_gym.discovery.thresholds import LARGEST_NOISE, STRUCTURE
 
 Array = NDArray[np.float64]
-
-FAR = 10.0
-"""Residual (root mean square), in standard deviations of a signal's noise, from which on it is no
-noise whatever its form."""
-
-STRUCTURE = 3.0
-"""The same of a fit with effects, from which on what is left has no memory that is a noise's."""
 
 
 def reestimated_noise(
@@ -96,7 +90,7 @@ def far_off(problem: FitProblem, fit: Fitted, chosen: Sequence[CandidateEffect] 
 
     Where everything is wrong, turning signs of the residual's pieces tells chance from nothing.
     """
-    return any(size > FAR for size in left_in_noises(problem, fit, chosen).values())
+    return any(size > LARGEST_NOISE for size in left_in_noises(problem, fit, chosen).values())
 
 
 def left_in_noises(

@@ -14,27 +14,16 @@ from numpy.typing import NDArray
 from scipy.linalg import eigvalsh, toeplitz
 from scipy.stats import binom
 
-from pma_gym.discovery.preparation.noise import (
-    ENOUGH,
+from pma_gym.discovery.preparation.noise import Whitening, autoregression, sparse, white_noise
+from pma_gym.discovery.thresholds import (
+    ENOUGH_FOR_NOISE,
     LEAST_REST,
-    Whitening,
-    autoregression,
-    sparse,
-    white_noise,
+    OUTLIER,
+    OUTLIERS_CHANCE,
+    SCAN_CHANCE,
 )
 
 Array = NDArray[np.float64]
-
-CHANCE = 2.5e-5
-"""Chance, at most, that noise alone makes a burst anywhere in a signal's residual: with four
-signals, one data set in ten thousand."""
-
-OUTLIER = 3.5
-"""Standard deviations beyond which a reading is an outlier."""
-
-BY_CHANCE = 0.01
-"""Chance, over all pieces of a signal, that as many outliers fall into one of them as there
-are, where they come one by one: a sensor may throw readings, at any rate, without structure."""
 
 HALVINGS = 60
 """Of an interval, in search of where a bound is least."""
@@ -69,7 +58,7 @@ def scan_statistic(
         step: between readings (SI): rounding moves one by half of it at most, and noise need not
             do what rounding can.
     """
-    if sparse(parts) or sum(int(np.isfinite(part).sum()) for part in parts) < ENOUGH:
+    if sparse(parts) or sum(int(np.isfinite(part).sum()) for part in parts) < ENOUGH_FOR_NOISE:
         return NO_EXCESS
     pieces = [
         piece[np.isfinite(piece)]
@@ -77,7 +66,7 @@ def scan_statistic(
         for piece in np.split(part, at[1:-1])
     ]
     pieces = [piece for piece in pieces if len(piece) >= LEAST_REST]
-    if len(pieces) < 2:
+    if len(pieces) <= 1:
         return NO_EXCESS
     noise = noise_of(parts, level)
     beyond = [np.maximum(np.abs(piece) - 0.5 * step, 0.0) / noise.level for piece in pieces]
@@ -92,7 +81,7 @@ def scan_statistic(
         power = float(beyond[k] @ beyond[k] - np.max(beyond[k]) ** 2)
         chance = tail(power, weights[size]) * len(pieces)
         least = min(least, chance)
-        if chance <= CHANCE:
+        if chance <= SCAN_CHANCE:
             excess += float(pieces[k] @ pieces[k] - size * noise.level**2) / level**2
     return ScanStatistic(least, excess)
 
@@ -118,7 +107,7 @@ def _together(beyond: Sequence[Array]) -> NDArray[np.bool_]:
     outliers = np.array([np.count_nonzero(piece > OUTLIER) for piece in beyond])
     sizes = np.array([len(piece) for piece in beyond])
     rate = (outliers.sum() - outliers + 1.0) / (sizes.sum() - sizes + 1.0)
-    return binom.sf(outliers - 1, sizes, rate) * len(beyond) <= BY_CHANCE
+    return binom.sf(outliers - 1, sizes, rate) * len(beyond) <= OUTLIERS_CHANCE
 
 
 def autocorrelation(noise: Whitening, count: int) -> Array:

@@ -9,16 +9,13 @@ from pma_gym.discovery.preparation.whitened_residuals import WhitenedResiduals
 from pma_gym.discovery.screening.probe_scores import Baseline, probe_scores
 from pma_gym.discovery.screening.score_test import ScreeningScore
 from pma_gym.discovery.screening.starting_points import AT_ONCE
+from pma_gym.discovery.thresholds import LEAST_GAIN, WORTH_A_FIT
 
 Array = NDArray[np.float64]
 
 SCANNED, WIDER = 32, 4.0
 """Values of a parameter that a scan of its range simulates, and how far it goes beyond the
 probes."""
-
-MILD, TELLING = 0.05, 30.0
-"""Share of the largest promise over a range, and chi-square, that a value must promise to be worth
-a refit: of less, what a fit stops short of would tell as much."""
 
 
 @dataclass(frozen=True)
@@ -43,7 +40,7 @@ class ScannedRange:
 
     def mildest(self) -> int | None:
         """Which value changes least of those that promise a share of the most; None: none does."""
-        least = max(MILD * self.most, min(self.most, TELLING))
+        least = max(WORTH_A_FIT * self.most, min(self.most, LEAST_GAIN))
         promising = np.flatnonzero(self.promises >= least)
         return int(promising[np.argmin(self.changes[promising])]) if self.most > 0.0 else None
 

@@ -14,14 +14,12 @@ from numpy.typing import NDArray
 from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
 from pma_gym.discovery.preparation.whitened_residuals import WhitenedResiduals
 from pma_gym.discovery.screening.probe_scores import Baseline, ProbeScores, probe_scores
+from pma_gym.discovery.thresholds import SHOWN_GAIN
 
 Array = NDArray[np.float64]
 
 RESAMPLES = 1999
 """Simulated residuals for p-values."""
-
-SHOWN_GAIN = 25.0
-"""Chi-square that an effect must gain to be seen for certain: five standard deviations."""
 
 FACTORS = (0.1, 8.0)
 """By what a probe may be multiplied to start a fit from."""

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pma_gym.data.signals import VOLTAGE_RANGE
+from pma_gym.discovery.thresholds import COMMAND_STEP, COMMAND_STEP_PER_S, MOVING, SLOWEST_M_S
 from pma_gym.estimation.logged import Logged
 from pma_gym.units import SI_FACTORS
 
@@ -20,19 +21,12 @@ PIECE_BINS = 20
 """Ticks of a piece that is dealt as a whole: a second, longer than the memory of noise and
 plant."""
 
-MOVING = 0.05
-"""Slowest speed that counts as motion, as a share of the largest in all trials."""
-
-SLOWEST = 0.5e-3
-"""The same in m/s, where that is less."""
+SPEED_ROWS = 3
+"""Fewest readings from which a speed is taken."""
 
 SMOOTH_S = 0.03
-"""Width of the mean over simulated position that speed is taken of (s): not each slip of dry
-friction is a reversal."""
-
-STEP, STEP_PER_S = 0.01, 0.8
-"""Least change of a command between two rows, and its rate (1/s), that is a step, as shares of the
-command's range."""
+"""Time over which a speed is taken (s): longer than noise and a slip of dry friction, shorter than
+a motion."""
 
 
 @dataclass(frozen=True)
@@ -82,7 +76,7 @@ def time_bins(
         _speed(logged.time, logged.row(held, "displacement"))
         for logged, held in zip(logs, readings, strict=True)
     ]
-    still = min(SLOWEST, MOVING * max(float(np.abs(each).max()) for each in speeds))
+    still = min(SLOWEST_M_S, MOVING * max(float(np.abs(each).max()) for each in speeds))
     steps = _step_sizes(logs)
     parts = []
     for number, (logged, held, residual) in enumerate(zip(logs, readings, residuals, strict=True)):
@@ -116,7 +110,7 @@ def _of_trial(logged: Logged, conditions: Mapping[str, Array], residual: Array) 
 
 def _padded(values: Array, spare: int) -> Array:
     """Some more ticks: without readings, in a condition that lies in no region."""
-    if values.ndim == 2:
+    if values.ndim > 1:
         return np.pad(values, ((0, 0), (0, spare)))
     return np.pad(values, (0, spare), constant_values=np.nan)
 
@@ -124,7 +118,7 @@ def _padded(values: Array, spare: int) -> Array:
 def _step_sizes(logs: Sequence[Logged]) -> tuple[float, float]:
     """Least step of each command."""
     low, high = VOLTAGE_RANGE
-    return STEP * max(logged.motor_span for logged in logs), STEP * (high - low)
+    return COMMAND_STEP * max(logged.motor_span for logged in logs), COMMAND_STEP * (high - low)
 
 
 def _conditions(
@@ -159,7 +153,7 @@ def _conditions(
 
 
 def _speed(time: Array, position: Array) -> Array:
-    if len(time) < 3:
+    if len(time) < SPEED_ROWS:
         return np.zeros(len(time))
     width = max(1, round(SMOOTH_S / float(np.median(np.diff(time)))))
     sums = np.cumsum(np.append(0.0, position))
@@ -177,6 +171,6 @@ def _stepped(logged: Logged, steps: tuple[float, float]) -> Mask:
     stepped = np.zeros(len(logged.time), bool)
     for command, least in zip((logged.motor, logged.regulator), steps, strict=True):
         change = np.abs(np.diff(command))
-        pace = STEP_PER_S / STEP * np.diff(logged.time)
+        pace = COMMAND_STEP_PER_S / COMMAND_STEP * np.diff(logged.time)
         stepped[1:] |= (change > least) & (change > least * pace)
     return stepped

@@ -13,21 +13,22 @@ import numpy as np
 from scipy.integrate import cumulative_trapezoid
 
 from pma_gym.data.trial import Trial
+from pma_gym.discovery.screening.time_bins import SMOOTH_S
+from pma_gym.discovery.thresholds import (
+    FORCE_SHARE,
+    RIPPLE_PERIODS,
+    SLIP_DEFLECTION,
+    SPEED_SHARE,
+    STATIC_SHARE,
+)
 from pma_gym.effects.effect import signals
 from pma_gym.plant import sensors
 from pma_gym.plant.imposed_motion import smoothed
 from pma_gym.plant.model import Model
 from pma_gym.units import Quantity
 
-FORCE_SHARE, SPEED_SHARE = 0.1, 0.05
-"""Usual size of a force over that of the drive, and of a speed at which something changes over the
-speed of the trials."""
-
 LARGE = 0.9
 """Quantile of a quantity's magnitude in the trials that is its size."""
-
-SMOOTH_S = 0.03
-"""Time over which a speed is taken (s): longer than noise, shorter than a motion."""
 
 LEAST_ROWS = 8
 """Fewest readings of a trial that say how far it goes."""
@@ -55,9 +56,6 @@ DIMENSIONS: dict[str, tuple[int, int, int, int]] = {
 }
 """Powers of force, speed, way and pressure in a unit, for those that scale with them."""
 
-DEFLECTION = 1e-3
-"""Most of what a contact deflects before it slips, over the way of the trials: an assumption."""
-
 RESTS = (0.0, 1.0, -1.0, 4.0, -4.0)
 """Where a spring may be relaxed, over half of the trials' longest way."""
 
@@ -65,21 +63,8 @@ RIPPLE = 4.0
 """Periods of a force that is periodic in the position, over half of the trials' longest way. The
 slope of a factor over the position is looked for at as much, over the same."""
 
-LEAST_PERIODS = 1.25
-"""Least number of its periods over the longest way: a bump at an end of the way is part of a wave,
-too, that is never seen to repeat."""
-
-
 LARGEST = 0.99
 """The same of an acceleration's peaks: the last hundredth may be readings that stand alone."""
-
-STATIC_SHARE = 2.0
-"""Largest static friction that is looked for, over the strongest force in the trials.
-
-Friction that no force of the trials overcomes holds the rig, however large it is: the trials tell
-no value above the strongest force from another. A fit that goes there meets a contact so stiff that
-it rings a thousand times a second, and does not end. Twice, because mass and drive are known to a
-share only."""
 
 
 @dataclass(frozen=True)
@@ -115,7 +100,7 @@ class Sizes:
 
     def least_periods(self, quantity: Quantity) -> float:
         """Least periods (file unit) that the trials' longest way tells from another law."""
-        least = quantity.from_si(LEAST_PERIODS / (2.0 * self.way))
+        least = quantity.from_si(RIPPLE_PERIODS / (2.0 * self.way))
         return float(np.clip(least, quantity.lower, quantity.upper))
 
     def most_friction(self, quantity: Quantity) -> float:
@@ -135,7 +120,7 @@ class Sizes:
         """
         usual = quantity.usual
         assert usual is not None
-        most = quantity.from_si(DEFLECTION * self.way)
+        most = quantity.from_si(SLIP_DEFLECTION * self.way)
         return replace(quantity, usual=float(np.clip(min(usual, most), quantity.lower, usual)))
 
 

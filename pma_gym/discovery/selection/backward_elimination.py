@@ -3,8 +3,8 @@
 With all parameters free at once, one that is off hides behind others that do nearly the same, each
 of them a little off. A lab seldom has all its numbers wrong. So parameters are put back to the
 values that they were given, one after the other, the least missed first, as long as the odds that
-it is off are less than `ODDS`. With a parameter's estimate z standard errors away from its given
-value, and errors p assumed beforehand and e in the end,
+it is off are less than `OFF_ODDS`. With a parameter's estimate z standard errors away from its
+given value, and errors p assumed beforehand and e in the end,
 
     log odds = z^2 / 2 - log(p / e)
 
@@ -22,12 +22,9 @@ from pma_gym.discovery.fitting.covariance import clusters, covariance, widened
 from pma_gym.discovery.fitting.fit_problem import FitProblem, Fitted
 from pma_gym.discovery.fitting.free_parameters import FreeParameters
 from pma_gym.discovery.preparation.whitened_residuals import Pieces
+from pma_gym.discovery.thresholds import OFF_ODDS
 
 Array = NDArray[np.float64]
-
-ODDS = 20.0
-"""Odds beyond which a parameter is said to be off: that it is not is then as unlikely as that a
-95 % interval misses."""
 
 
 @dataclass(frozen=True)
@@ -65,9 +62,9 @@ def backward_elimination(problem: FitProblem, fit: Fitted) -> Elimination | None
         occam = np.log(np.maximum(whitened.prior[kept] / errors, 1.0))
         odds = 0.5 * (moves / errors) ** 2 - occam
         least = int(np.argmin(odds))
-        if odds[least] > np.log(ODDS):
+        if odds[least] > np.log(OFF_ODDS):
             break
-        room += 2.0 * (np.log(ODDS) + occam[least])
+        room += 2.0 * (np.log(OFF_ODDS) + occam[least])
         kept = np.delete(kept, least)
     most = fit.chi_square + room
     if not np.isfinite(most):

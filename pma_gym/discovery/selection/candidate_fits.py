@@ -15,38 +15,24 @@ from pma_gym.discovery.screening.scanned_range import ScannedRange, scanned_rang
 from pma_gym.discovery.screening.score_test import ScreeningScore
 from pma_gym.discovery.screening.starting_points import starting_points
 from pma_gym.discovery.selection.kept_fits import kept_form, restored
+from pma_gym.discovery.thresholds import (
+    COST,
+    LEAST_FITTED,
+    LEAST_GAIN,
+    LEAST_KEPT,
+    LIKELY,
+    MOST_OF_IT,
+    NOISE_LEFT,
+    SAME_MINIMUM,
+)
 from pma_gym.effects import CATALOGUE
 from pma_gym.plant.model import Model
 
 BEGUN, ALL_BEGUN = 2, 8
 """How many fits of a candidate are started, and how many where none came near the trials."""
 
-LEAST_KEPT = 0.7
-"""Share of the gain that a score promised below which a fit is tried again from a scan of the
-candidate's range."""
-
-ALIKE = 0.05
-"""Share of chi-square within which two fits ended at the same minimum: a further beginning that
-ends there too tells nothing new."""
-
 BEST_SCANNED = 4
 """From how many values of that scan fits are begun."""
-
-LIKELY = 0.25
-"""Share of the best score's promise from which on a candidate is fitted from more beginnings."""
-
-LEAST_FITTED = 0.35
-"""The same, below which a candidate counts as one that could not be fitted."""
-
-MUCH, MOST_OF = 1.05, 0.8
-"""Noises left from which on another effect counts that carries this share of what is left beyond
-the noise: an approximate law leaves less, and no other law carries that."""
-
-LEAST_GAIN = 30.0
-"""Least fall of chi-square by an effect that is added, or stays. An assumption."""
-
-COST = 3.0
-"""Log-likelihood that a parameter costs: half the logarithm of some 400 effective readings."""
 
 
 def cost(fit: Fitted) -> float:
@@ -56,7 +42,9 @@ def cost(fit: Fitted) -> float:
 
 def carries_the_rest(problem: FitProblem, before: Fitted, gain: float) -> bool:
     """Whether a fall of chi-square is most of what a fit leaves, where it leaves much."""
-    return problem.left(before) > MUCH and gain > MOST_OF * (before.chi_square - problem.count)
+    return problem.left(before) > NOISE_LEFT and gain > MOST_OF_IT * (
+        before.chi_square - problem.count
+    )
 
 
 def starting_values(candidate: CandidateEffect, *fits: Fitted) -> np.ndarray:
@@ -119,7 +107,7 @@ def fitted(
             break
     kept = 0.0 if best is None else before.chi_square - best.chi_square
     # Far from the trials a promise of less than two like fits differ by is not worth a scan.
-    slight = problem.far(before) and each.gain < ALIKE * before.chi_square
+    slight = problem.far(before) and each.gain < SAME_MINIMUM * before.chi_square
     if kept < LEAST_KEPT * each.gain and not slight:
         for begun in scanned_range(baseline, whitened, each).values[:BEST_SCANNED]:
             fit = problem.fit(before.model, extra, {each.candidate.name: begun})
@@ -136,7 +124,9 @@ def _alike(one: Fitted | None, other: Fitted | None) -> bool:
     """Whether two fits ended at the same chi-square, as far as a choice of effects goes."""
     if one is None or other is None:
         return False
-    return abs(one.chi_square - other.chi_square) < ALIKE * min(one.chi_square, other.chi_square)
+    return abs(one.chi_square - other.chi_square) < SAME_MINIMUM * min(
+        one.chi_square, other.chi_square
+    )
 
 
 def _beginnings(

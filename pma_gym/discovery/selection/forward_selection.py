@@ -28,7 +28,6 @@ from pma_gym.discovery.fitting.journal import Journal
 from pma_gym.discovery.result.estimates import Undetermined
 from pma_gym.discovery.screening.residuals import reestimated_noise
 from pma_gym.discovery.selection.candidate_fits import (
-    LEAST_GAIN,
     better,
     carries_the_rest,
     cost,
@@ -39,6 +38,7 @@ from pma_gym.discovery.selection.candidate_fits import (
 from pma_gym.discovery.selection.scanned_parameters import with_scanned
 from pma_gym.discovery.selection.stages import Progress, Stage, stage_of
 from pma_gym.discovery.selection.tied_laws import Chosen, Nested, fit_tied, simpler_laws
+from pma_gym.discovery.thresholds import LEAST_GAIN, MOST_EFFECTS, SECOND_SHARE, SURE_SHARE
 from pma_gym.effects import CATALOGUE
 
 
@@ -115,15 +115,8 @@ def further_terms(
     return terms
 
 
-SECOND_SHARE, SURE_SHARE = 0.12, 0.02
-"""Least share of the first effect's gain that another must bring: what a law of the catalogue
-misses of its real likeness is of that order; and the same where the residual is surely no noise."""
-
 BEGINNINGS = 3
 """How often the selection begins anew from a better refitted model."""
-
-MOST_EFFECTS = 3
-"""Most effects that are added."""
 
 
 @dataclass(frozen=True)

@@ -37,15 +37,7 @@ from pma_gym.discovery.selection.tied_laws import (
     simpler_laws,
 )
 from pma_gym.discovery.selection.whole_laws import begun_above
-
-FLAT = 4.0
-"""Chi-square by which a profile may rise and still be flat: twice a log-likelihood of 2."""
-
-UNSURE = 3.0
-"""Standard errors within which a limit, or a parameter that may be equal, makes one doubtful."""
-
-FAR_NEARER = 4.0
-"""How many times less chi-square a whole law leaves that stays in any case: half the residual."""
+from pma_gym.discovery.thresholds import AS_GOOD, FLAT, SURE
 
 HALVINGS = 5
 """How often the place where a profile leaves its flat is halved."""
@@ -77,7 +69,7 @@ def _left(problem: FitProblem, state: Nested, path: str) -> Nested | None:
     place = _place(state.chosen, path)
     candidate = state.chosen[place]
     shape = not candidate.amplitudes[candidate.paths.index(path)]
-    if path not in candidate.fitted_paths or len(candidate.fitted_paths) < 2:
+    if path not in candidate.fitted_paths or len(candidate.fitted_paths) <= 1:
         return None
     value, error = state.fit.estimate(path)
     # A size goes only where the trials do not show it at all: a friction by what nothing carries.
@@ -87,7 +79,7 @@ def _left(problem: FitProblem, state: Nested, path: str) -> Nested | None:
     doubtful = [
         end
         for end in (low, high)
-        if not np.isfinite(error) or abs(value - end) < UNSURE * error or _beyond(value, end, low)
+        if not np.isfinite(error) or abs(value - end) < SURE * error or _beyond(value, end, low)
     ]
     held = {end: fit_held(problem, state, place, {path: end}) for end in doubtful}
     flat = {end: new for end, new in held.items() if new is not None and _flat(state.fit, new.fit)}
@@ -155,7 +147,7 @@ def _tied(problem: FitProblem, state: Nested, place: int) -> Nested:
                 fit = _as_wide(fit, whole.fit)
                 continue
             # A simpler law that is far from the trials gives the other parameters false values.
-            nearer = whole.fit.chi_square * FAR_NEARER < simpler.fit.chi_square
+            nearer = whole.fit.chi_square * AS_GOOD < simpler.fit.chi_square
             nearer |= problem.far(simpler.fit) and not problem.far(whole.fit)
             if nearer or _is_shown(problem, whole, tie):
                 state = whole
@@ -216,7 +208,7 @@ def _ended(problem: FitProblem, state: Nested, path: str) -> bool:
     value, error = state.fit.estimate(path)
     lower, upper = _range(problem, state, path)
     # A range may be a million times as wide as the value: what is surely off its end is not there.
-    surely = lower + UNSURE * error < value < upper - UNSURE * error
+    surely = lower + SURE * error < value < upper - SURE * error
     return bool(at_limit(value, lower, upper)) and not surely
 
 

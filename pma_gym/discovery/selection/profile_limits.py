@@ -10,16 +10,10 @@ from numpy.typing import NDArray
 from pma_gym.discovery.fitting.candidate_effect import CandidateEffect, bounds
 from pma_gym.discovery.fitting.fit_problem import FitProblem, Fitted
 from pma_gym.discovery.fitting.free_parameters import unit
+from pma_gym.discovery.screening.time_bins import SPEED_ROWS
+from pma_gym.discovery.thresholds import FAR_ABOVE, FAR_BELOW
 from pma_gym.estimation.logged import Logged
 from pma_gym.units import SI_FACTORS
-
-FAR_ABOVE, FAR_BELOW = 30.0, 1e-4
-"""How many times as large as the largest in the trials a value is that does what an infinite one
-does; and the share of it that does what none does."""
-
-
-LEAST_ROWS = 3
-"""Fewest readings from which a speed is taken."""
 
 UNITS = {
     "displacement": (("mm", "um"), ("mm/s",)),
@@ -81,6 +75,6 @@ def _known(logged: Logged, held: Array, channel: int) -> tuple[Array, Array]:
     """A signal (SI) as measured, else as simulated, and the times (s) of its readings."""
     there = np.full(len(logged.time), bool(logged.measures[channel]))
     there[logged.missing[channel]] = False
-    if there.sum() < LEAST_ROWS:
+    if there.sum() < SPEED_ROWS:
         return held[channel], logged.time
     return logged.measured[channel, there], logged.time[there]

@@ -7,19 +7,7 @@ from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
 from pma_gym.discovery.fitting.fit_problem import FitProblem, Fitted
 from pma_gym.discovery.selection.candidate_fits import cost, starting_values
 from pma_gym.discovery.selection.stages import Stage
-
-NEAREST = 12.0
-"""Chi-square within which two effects are not identifiable: odds of 400 to 1."""
-
-NEAREST_SHARE = 0.02
-"""The same as a share of what the effect gained: laws of a catalogue are likenesses, and the wrong
-one of two that differ by less may be the nearer likeness by chance."""
-
-CLOSE = 0.35
-"""Share of the gain within which a rival is fitted again with the noise as reestimated."""
-
-MOST = 5
-"""Most rivals that are fitted again."""
+from pma_gym.discovery.thresholds import MOST_REFITTED, NEAREST, NEAREST_SHARE, REFITTED_RIVAL
 
 
 @dataclass(frozen=True)
@@ -63,11 +51,11 @@ def rivals(
     gain = stage.before.chi_square - own.chi_square
     taken = {candidate.name for candidate in chosen}
     near = sorted(
-        (name for name, fit in stage.fits.items() if cost(fit) - cost(own) < CLOSE * gain),
+        (name for name, fit in stage.fits.items() if cost(fit) - cost(own) < REFITTED_RIVAL * gain),
         key=lambda name: cost(stage.fits[name]),
     )
     ranked = []
-    for name in [name for name in near if name not in taken][:MOST]:
+    for name in [name for name in near if name not in taken][:MOST_REFITTED]:
         candidate = next(each for each in candidates if each.name == name)
         others = [*chosen]
         others[place] = candidate

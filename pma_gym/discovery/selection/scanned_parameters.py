@@ -17,7 +17,8 @@ from pma_gym.discovery.fitting.candidate_effect import CandidateEffect, bounds
 from pma_gym.discovery.fitting.fit_problem import FitProblem, Fitted
 from pma_gym.discovery.fitting.free_parameters import values
 from pma_gym.discovery.fitting.journal import Journal
-from pma_gym.discovery.selection.candidate_fits import COST, refit
+from pma_gym.discovery.selection.candidate_fits import refit
+from pma_gym.discovery.thresholds import COST
 from pma_gym.effects import CATALOGUE
 
 LADDER = (10.0, 10.0**0.5)

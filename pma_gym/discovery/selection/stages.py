@@ -18,9 +18,15 @@ from pma_gym.discovery.screening.scan_statistic import NO_EXCESS, ScanStatistic
 from pma_gym.discovery.screening.score_test import ScreeningScore, screen
 from pma_gym.discovery.screening.starting_points import refined_score
 from pma_gym.discovery.selection.candidate_fits import fitted, probed, restarted, unfitted
-
-TRIED, NEAR = 8, 0.05
-"""How many candidates are fitted at most, and the share of the best look's gain that one needs."""
+from pma_gym.discovery.thresholds import (
+    ALARM,
+    BESIDE_DRIFT,
+    BESIDE_STEPS,
+    CARRIED,
+    LEAST_CHANGE,
+    TRIED,
+    WORTH_A_FIT,
+)
 
 Progress = Callable[[str, int, int], None]
 
@@ -48,7 +54,7 @@ def fits_of_candidates(
         progress: called with a step's name, what is done and the total.
     """
     fits: dict[str, Fitted] = {}
-    worth = [each for each in scores if each.gain > NEAR * scores[0].gain and each.starts]
+    worth = [each for each in scores if each.gain > WORTH_A_FIT * scores[0].gain and each.starts]
     for number, each in enumerate(worth[:TRIED]):
         progress(f"fitting effect {len(chosen) + 1}", number, len(worth[:TRIED]))
         refit = fitted(problem, baseline, before, chosen, each, journal)
@@ -58,26 +64,6 @@ def fits_of_candidates(
     if restarts:
         fits |= restarted(*beside, worth, scored, fits, journal, progress)
     return fits, unfitted(*beside, worth[:TRIED], fits)
-
-
-ALARM = 0.005
-"""Family-wise rate of false alarms that the gate lets through."""
-
-LEAST_CHANGE = 0.15
-"""Least rms of what an effect changes beyond parameters, over the noise of the signal where that is
-most: what is smaller is not worth a name, and no model's arithmetic is that exact."""
-
-TAKEN_UP_CHANGE = 0.05
-"""The same beside a drift, which is as slow as creep and takes up most of it. An assumption: creep
-as large as the noise changes 0.07 to 0.13 beside a drift."""
-
-COARSE_CHANGE = 0.5
-"""The same beside a sensor whose readings keep to coarse steps: what is lost between them is no
-noise, and follows the motion."""
-
-CARRIED = 0.5
-"""Share of the bursts in a residual that a fit must explain, where they alone opened the gate:
-noise that is larger in places bursts too, and no effect explains half of that."""
 
 
 @dataclass(frozen=True)
@@ -209,11 +195,11 @@ def _refined_scores(
 
 def passes(problem: FitProblem, each: ScreeningScore, missing: bool = False) -> bool:
     """Whether chance, or arithmetic, would not show as much; chance may be ruled out already."""
-    least = COARSE_CHANGE if problem.coarse else _least_change(problem)
+    least = BESIDE_STEPS if problem.coarse else _least_change(problem)
     return (missing or each.p_value <= ALARM) and each.change >= least
 
 
 def _least_change(problem: FitProblem) -> float:
     """Least rms of what an effect changes, over the noise."""
     drifts = any(each.drift for each in problem.noise)
-    return TAKEN_UP_CHANGE if drifts else LEAST_CHANGE
+    return BESIDE_DRIFT if drifts else LEAST_CHANGE

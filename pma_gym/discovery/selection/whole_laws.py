@@ -14,18 +14,15 @@ from numpy.typing import NDArray
 
 from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
 from pma_gym.discovery.fitting.covariance import covariance
-from pma_gym.discovery.fitting.fit_problem import SURE, FitProblem, Fitted
+from pma_gym.discovery.fitting.fit_problem import FitProblem, Fitted
 from pma_gym.discovery.selection.tied_laws import Chosen, Tie, below_twin, idle_values
+from pma_gym.discovery.thresholds import AS_GOOD, CONFIDENCE
 
 Array = NDArray[np.float64]
 
 STARTS = ((1.1, 0.5), (1.25, 1.0), (1.4, 2.0))
 """How many times as large as its twin a parameter begins that the simpler law ties to it, and at
 which share of its usual value what does nothing in the simpler law."""
-
-ALIKE = 4.0
-"""How many times the least chi-square one may have that explains about as well, a residual twice as
-large: where one trial outweighs all others, chance alone would allow anything."""
 
 
 def begun_above(
@@ -68,7 +65,7 @@ def _interval(problem: FitProblem, fit: Fitted, chosen: Chosen) -> tuple[Array, 
     """Intervals of the parameters at one optimum; the values where it does not tell them."""
     variances = np.diag(covariance(problem, fit, chosen))
     known = np.isfinite(variances) & (variances > 0.0)
-    error = SURE * np.sqrt(np.where(known, variances, 0.0))
+    error = CONFIDENCE * np.sqrt(np.where(known, variances, 0.0))
     return fit.values - error, fit.values + error
 
 
@@ -89,7 +86,7 @@ def _equals(problem: FitProblem, fits: Sequence[Fitted], chosen: Chosen) -> list
     if not parts:
         return []
     best = min(parts, key=np.sum)
-    most = ALIKE * float(best.sum())
+    most = AS_GOOD * float(best.sum())
     pairs = zip(fits, parts, strict=True)
     return [fit for fit, part in pairs if part.sum() < most and _is_by_chance(part - best)]
 
@@ -105,9 +102,9 @@ def _chi_squares(problem: FitProblem, fit: Fitted, chosen: Chosen) -> Array:
 def _is_by_chance(differences: Array) -> bool:
     """Whether differences add up to no more than chance would have them."""
     count = len(differences)
-    if not np.isfinite(differences).all() or count < 2:
+    if not np.isfinite(differences).all() or count <= 1:
         return False
-    chance = SURE * np.sqrt(count) * differences.std(ddof=1)
+    chance = CONFIDENCE * np.sqrt(count) * differences.std(ddof=1)
     return bool(differences.sum() <= chance)
 
 

@@ -1,7 +1,7 @@
 """Whether what a model leaves of readings that it was not fitted to is noise.
 
 A verdict that denies missing structure (`agrees`, `parameters`) needs it of every signal: the
-misfit is at most `MOST_FLOORS` floors, and a flexible regression on state, command and the
+misfit is at most `COMPLETE` floors, and a flexible regression on state, command and the
 command's history explains less than `MOST_EXPLAINED` floors of it. No rig and no sensor is exempt.
 Where the readings that the model was fitted to are beyond these limits too, structure is missing.
 Where only those left out are, the trials may not determine the parameters: the verdict is
@@ -23,22 +23,17 @@ from pma_gym.discovery.preparation.noise import (
     rest_readings,
     white_noise,
 )
+from pma_gym.discovery.thresholds import (
+    BLOCK_S,
+    COMPLETE,
+    LEAST_BLOCKS,
+    MOST_EXPLAINED,
+    SIGNIFICANT,
+)
 from pma_gym.discovery.verdict.flexible_regression import explained, variables
 from pma_gym.estimation.logged import Logged
 
 Array = NDArray[np.float64]
-
-MOST_FLOORS = 1.5
-"""Largest misfit (root mean square) on readings left out, in floors."""
-
-MOST_EXPLAINED = 0.5
-"""What a flexible regression may explain of it (root mean square), in floors: upper 95 % bound."""
-
-CHANCE = 0.05
-"""That the bound of any signal is exceeded by chance."""
-
-BLOCK_S, LEAST_BLOCKS = 1.0, 8
-"""Length of the bootstrap's blocks (s), and fewest blocks whose bound means anything."""
 
 Fault = Literal[
     "misfit", "explained", "not predicted", "follows", "alike", "wide", "no floor", "not left out"
@@ -159,21 +154,21 @@ def _judged(
         return SignalAdequacy(None, fault="no floor")
     inside = fitted.misfit(channel, floor)
     if unseen is None:
-        missing = inside > MOST_FLOORS
+        missing = inside > COMPLETE
         return SignalAdequacy(floor, fitted=inside, fault="misfit" if missing else "not left out")
     misfit = unseen.misfit(channel, floor)
     if unseen.is_summary(channel):
         # A regression on a few readings a trial learns nothing; the scatter of repeats, a tolerance
         # or the printed errors say what is noise. Rest segments do not.
         fault: Fault | None = "no floor" if floor.source == REST else None
-        if misfit > MOST_FLOORS:
-            fault = "misfit" if inside > MOST_FLOORS else "not predicted"
+        if misfit > COMPLETE:
+            fault = "misfit" if inside > COMPLETE else "not predicted"
         return SignalAdequacy(floor, misfit, fitted=inside, fault=fault)
     share, bound = unseen.explained(channel, floor)
     fault = None
-    if inside > MOST_FLOORS:
+    if inside > COMPLETE:
         fault = "misfit"
-    elif misfit > MOST_FLOORS:
+    elif misfit > COMPLETE:
         fault = "not predicted"
     elif share >= MOST_EXPLAINED:
         # Parameters that the other readings do not hold leave a residual that follows the state.
@@ -232,7 +227,7 @@ class _Judge:
         bound = np.inf
         if len(share.counts) >= LEAST_BLOCKS:
             generator = np.random.default_rng([self._seed, channel])
-            bound = share.bound(CHANCE / self._signals, generator)
+            bound = share.bound(SIGNIFICANT / self._signals, generator)
         return float(np.sqrt(max(share.mean, 0.0))), float(np.sqrt(max(bound, 0.0)))
 
 

@@ -11,21 +11,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from pma_gym.discovery.result.misfit import Gap
+from pma_gym.discovery.thresholds import APPROXIMATE_LEFT, LEAST_MISFIT, LEFT
 from pma_gym.effects import CATALOGUE
-
-MOST_LEFT = 0.15
-"""Most of the misfit beyond noise (mean square) that an approximate law may leave, as a share."""
-
-MOST_SCATTER = 0.25
-"""Most that the size of an effect may scatter by trial or condition for its law to be named as an
-approximate one: what scatters more (a friction that grows with pressure) has another law."""
-
-WORTH_SAYING = 0.5
-"""The same from which on the best candidate's size says nothing."""
-
-LEAST_MISFIT = 0.3
-"""Mean square beyond noise, over that of the noise and summed over signals, below which a share of
-it is none that the trials tell."""
 
 
 @dataclass(frozen=True)
@@ -51,12 +38,12 @@ class Closing:
     @property
     def named(self) -> bool:
         """Whether the effect is named although its law is only approximate."""
-        return self.held_out and self.laws == 1 and self.left <= MOST_LEFT
+        return self.held_out and self.laws == 1 and self.left <= APPROXIMATE_LEFT
 
     @property
     def worth_saying(self) -> bool:
         """Whether so much is closed that the size means something."""
-        return self.left <= WORTH_SAYING
+        return self.left <= LEFT
 
 
 def closing(gaps: Mapping[str, Gap], effects: Sequence[str]) -> Closing | None:

@@ -20,20 +20,11 @@ from scipy.stats import chi2
 from pma_gym.discovery.preparation.acceptance_floors import TOLERANCE
 from pma_gym.discovery.preparation.noise import Whitening
 from pma_gym.discovery.preparation.nuisance_projection import drift_columns, line_columns
+from pma_gym.discovery.thresholds import ALIKE_BESIDE, ALIKE_CHANCE, ALIKE_TRIALS
 from pma_gym.discovery.verdict.adequacy import Adequacy
 from pma_gym.estimation.logged import Logged
 
 Array = NDArray[np.float64]
-
-CHANCE = 0.02
-"""That sensors drift as much alike, over all signals, where the verdict is left open."""
-
-SURELY = 1e-6
-"""The same beside effects that explain most, for a name to be withheld: a right law that is not the
-rig's to the last digit leaves something slow, too. An assumption."""
-
-LEAST_TRIALS = 3
-"""Fewer trials than this may drift alike by chance."""
 
 SMALLEST = 1e-9
 """Share of the largest information below which a wave is not seen at all."""
@@ -58,7 +49,7 @@ def with_common_drift(
         beside: whether effects were added; their names are withheld, whatever else is wrong.
     """
     signals = dict(judged.signals)
-    most = (SURELY if beside else CHANCE) / max(len(signals), 1)
+    most = (ALIKE_BESIDE if beside else ALIKE_CHANCE) / max(len(signals), 1)
     for channel, (signal, noise) in enumerate(zip(logged[0].signals, noises, strict=True)):
         known = signals.get(signal.name)
         if known is None or known.floor is None or (known.fault and not beside):
@@ -83,7 +74,7 @@ def chance_of_common_drift(
         channel: the signal.
     """
     pairs = [(a, b) for a, b in zip(logged, left, strict=True) if a.measures[channel]]
-    if not noise.drift or len(pairs) < LEAST_TRIALS:
+    if not noise.drift or len(pairs) < ALIKE_TRIALS:
         return 1.0
     # Trials of other lengths may have more waves; all share the slowest.
     columns = [drift_columns(each, noise.waves) for each, _ in pairs]

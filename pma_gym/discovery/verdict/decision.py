@@ -6,24 +6,16 @@ import numpy as np
 
 from pma_gym.discovery.diagnosis import Verdict
 from pma_gym.discovery.fitting.free_parameters import values
-from pma_gym.discovery.selection.stages import LEAST_CHANGE
+from pma_gym.discovery.thresholds import (
+    LEAST_CHANGE,
+    MAJORITY,
+    MOST_RIVALS,
+    MUCH_EXPLAINED,
+    SLIGHT,
+    UNDETECTABLE_SHARE,
+)
 from pma_gym.discovery.verdict.findings import Findings
 from pma_gym.discovery.verdict.unknown import Reason, gate
-
-MOST_RIVALS = 2
-"""Most other phenomena that an effect may be confused with and still be named: groups of three."""
-
-MUCH_EXPLAINED = 0.1
-"""Share of chi-square that an effect could explain, from which on its not passing the gate means
-that there are too few data, not that the structure is right."""
-
-UNDETECTABLE_SHARE = 0.35
-"""Share of the catalogue that would not have shown, from which on the verdict is
-`undecidable`."""
-
-MOVED_CHANGE = 0.1
-"""Least rms change of the signals, over the noise, by which refitted parameters differ from those
-that were given: below, they agree."""
 
 
 def suspicious(findings: Findings) -> bool:
@@ -87,7 +79,7 @@ def verdict_of(
         return "undecidable"
     if findings.adequacy.undecided is not None:
         return "undecidable"
-    return "parameters" if moved and _change(findings) > MOVED_CHANGE else "agrees"
+    return "parameters" if moved and _change(findings) > SLIGHT else "agrees"
 
 
 def _confirmed(findings: Findings) -> bool:
@@ -96,7 +88,7 @@ def _confirmed(findings: Findings) -> bool:
         return True
     with_it, without = findings.unseen.deviance, findings.unseen_without.deviance
     # By the number of folds too: one beyond what the others reach may weigh more than all.
-    return bool(with_it.sum() < without.sum() or np.mean(with_it < without) > 0.5)
+    return bool(with_it.sum() < without.sum() or np.mean(with_it < without) > MAJORITY)
 
 
 def _change(findings: Findings) -> float:

@@ -8,22 +8,14 @@ from numpy.typing import NDArray
 from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
 from pma_gym.discovery.fitting.fit_problem import FitProblem, Fitted
 from pma_gym.discovery.preparation.whitened_residuals import Pieces, WhitenedResiduals
+from pma_gym.discovery.thresholds import CONDITION_GROUPS, LEAST_GAIN, LEAST_GROUPS, SURE
 from pma_gym.effects import CATALOGUE
 from pma_gym.estimation.least_squares import inverse
 
 Array = NDArray[np.float64]
 
-LEAST_STRENGTH = 3.0
-"""Standard errors that an effect must have in a group for the group to count."""
-
 LEAST_PART = 1e-3
 """Share of the largest curvature below which a difference of sizes is none that data tell."""
-
-LEAST_GAIN = 30.0
-"""Chi-square that sizes of their own must gain: chance gives some three."""
-
-GROUPS = 4
-"""Groups of equal size by each condition."""
 
 
 def homogeneity_test(
@@ -146,7 +138,7 @@ def _groups(
             edges = whitened.edges(logged)
             means += [held[channel, a:b].mean() for a, b in zip(edges, edges[1:], strict=False)]
         ranks = np.argsort(np.argsort(np.array(means), kind="stable"), kind="stable")
-        groups[signal.name] = (GROUPS * ranks // len(ranks)).astype(np.int64)
+        groups[signal.name] = (CONDITION_GROUPS * ranks // len(ranks)).astype(np.int64)
     return groups
 
 
@@ -159,8 +151,8 @@ def _scatter(
     shared = np.zeros((count, across.shape[1]))
     np.add.at(shared, group, across)
     strength = shared @ direction
-    seen = strength > LEAST_STRENGTH**2
-    if seen.sum() < 3:
+    seen = strength > SURE**2
+    if seen.sum() < LEAST_GROUPS:
         return 0.0
     known = np.isfinite(np.diag(own))
     shared = shared[:, known][seen]

@@ -9,10 +9,8 @@ from pma_gym.discovery.preparation.noise import slow_part, sparse
 from pma_gym.discovery.preparation.quantisation import is_coarse
 from pma_gym.discovery.screening.autocorrelation import autocorrelation_test, tone
 from pma_gym.discovery.screening.residuals import innovations, residuals
+from pma_gym.discovery.thresholds import LEAST_SLOW
 from pma_gym.discovery.verdict.findings import Findings
-
-LEAST_SLOW = 0.02
-"""Mean square of a signal's slow residual over that of its noise, below which there is none."""
 
 
 @dataclass(frozen=True)

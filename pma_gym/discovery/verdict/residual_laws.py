@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
 from pma_gym.discovery.fitting.fit_problem import FitProblem, Fitted
 from pma_gym.discovery.result.misfit import ResidualLaw
+from pma_gym.discovery.thresholds import BUMP_HEIGHTS, CONFIDENCE, PERIODIC_TURNS, UNDETERMINED
 from pma_gym.effects import CATALOGUE
 from pma_gym.plant import sensors
 from pma_gym.units import SI_FACTORS
@@ -29,10 +30,6 @@ LAWS = {
 
 RANGE = (2.0, 98.0)
 """Percentiles of the data between which heights are laid."""
-
-UNDETERMINED = 3.0
-"""Times the median standard error from which on a height is none that the data know, and is not
-drawn."""
 
 
 @dataclass(frozen=True)
@@ -94,8 +91,8 @@ def residual_law(drawn: EstimatedLaw) -> ResidualLaw:
         variable,
         at,
         law,
-        law - 1.96 * errors,
-        law + 1.96 * errors,
+        law - CONFIDENCE * errors,
+        law + CONFIDENCE * errors,
         words(at, law, errors, variable),
     )
 
@@ -112,9 +109,9 @@ def words(at: Array, law: Array, errors: Array, variable: str) -> str:
     turns = int(np.sum(np.diff(np.sign(law[sure])) != 0))
     half = np.abs(law) > 0.5 * abs(law[top])
     shape = f"most near {at[top]:.3g} {unit}: {abs(law[top]):.2g} N {sign} than the model has"
-    if turns >= 4:
+    if turns >= PERIODIC_TURNS:
         return f"it changes sign {turns} times over {name}, as a periodic law would; {shape}"
-    if half.sum() <= 3:
+    if half.sum() <= BUMP_HEIGHTS:
         return f"a bump, confined in {name}; {shape}"
     if np.all(np.diff(law) >= -np.abs(errors[1:])) or np.all(np.diff(law) <= np.abs(errors[1:])):
         return f"it goes one way over all of {name}, bent rather than straight; {shape}"

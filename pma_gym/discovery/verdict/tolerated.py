@@ -9,12 +9,10 @@ passed the gate: the model agrees, or its parameters are off, within the toleran
 from dataclasses import replace
 
 from pma_gym.discovery.screening.residuals import reestimated_noise
+from pma_gym.discovery.thresholds import MOST_TOLERANCES
 from pma_gym.discovery.verdict.findings import Findings
 from pma_gym.discovery.verdict.residual_fraction import residual_fraction
 from pma_gym.discovery.verdict.unknown import leaves_structure, shapeless_laws, why_unknown
-
-MOST_TOLERANCES = 1.0
-"""Largest misfit, in tolerances, that a model without effects may leave."""
 
 
 def may_be_tolerated(findings: Findings) -> bool:

@@ -7,11 +7,26 @@ from typing import Literal
 import numpy as np
 
 from pma_gym.data.trial_columns import BY_QUANTITY
-from pma_gym.discovery.screening.autocorrelation import SURE
-from pma_gym.discovery.screening.residuals import FAR, autocorrelation_tests, left_in_noises
-from pma_gym.discovery.verdict.adequacy import MOST_EXPLAINED, MOST_FLOORS
-from pma_gym.discovery.verdict.approximate import MOST_LEFT as MOST_APPROXIMATE
-from pma_gym.discovery.verdict.common_drift import SURELY
+from pma_gym.discovery.screening.residuals import autocorrelation_tests, left_in_noises
+from pma_gym.discovery.thresholds import (
+    ALIKE_BESIDE,
+    APPROXIMATE_LEFT,
+    CERTAIN,
+    COMPLETE,
+    CONFIDENCE,
+    DOUBTFUL,
+    EXTRAPOLATED,
+    LARGEST_NOISE,
+    MOST_AUTOCORRELATED,
+    MOST_EXPLAINED,
+    MOST_OF_RIVALS,
+    MOST_OF_SHAPES,
+    MOST_SPREAD,
+    SHAPE_FACTOR,
+    SHAPE_GAIN,
+    SLOW_LEFT,
+    WORTH_DRAWING,
+)
 from pma_gym.discovery.verdict.findings import Findings
 from pma_gym.discovery.verdict.homogeneity_test import homogeneity_test
 from pma_gym.discovery.verdict.residual_fraction import ResidualFraction
@@ -19,42 +34,8 @@ from pma_gym.discovery.verdict.residual_laws import EstimatedLaw, estimated_laws
 from pma_gym.effects import CATALOGUE
 from pma_gym.effects.effect import signals
 
-MOST_LEFT = 0.35
-"""Share of what was slow in the residual that may be left by effects that explain it."""
-
-DOUBTFUL = 0.08
-"""The same, from which on laws without a shape of their own are set against the effects."""
-
-BETTER, BETTER_BY = 1.15, 60.0
-"""By how much such a law must explain more than the effects to say that they are not it: a factor
-on their gain in chi-square, and chi-square."""
-
-WORTH_DRAWING = 0.15
-"""Share of the chi-square beyond noise that such a law must explain to be drawn."""
-
-MOST_AUTOCORRELATED = 0.1
-"""Largest fraction of the autocorrelated residual that may be left, beyond chance."""
-
-MOST_SPREAD = 0.12
-"""Most that an effect's size may scatter by trial or condition, beyond chance, as a share of it."""
-
-EXTRAPOLATED = 1.0
-"""Scatter from which on it is extrapolated: sizes of groups come from slopes, which hold for small
-changes. Sizes that really scattered by more than themselves would leave a residual; where none is
-left, the slopes are wrong, not the law."""
-
-MOST_OF_SHAPES = 1.25
-"""Noises that several laws of the position alone may leave."""
-
-MOST_OF_RIVALS = 0.05
-"""Share of the misfit beyond noise (sum of squares) that one law of the position alone may leave
-where a rival draws the rest as well: a right law leaves less, whatever smaller effect is beside."""
-
 PLACES = (set[str](), {"position"}, {"angle"}, {"contraction"})
 """What a law of the position alone takes, constants among them."""
-
-ABSENT = 1.96
-"""Standard errors of its size within which an effect may be absent."""
 
 Why = Literal[
     "unexplained",
@@ -153,7 +134,7 @@ def leaves_structure(findings: Findings, left: ResidualFraction) -> Reason | Non
     drawn = _undetermined(findings) or _drawn_by_shapes(findings, after > MOST_OF_RIVALS * before)
     if drawn is not None:
         return replace(drawn, effects=tuple(each.name for each in chosen), leaves=left.slow)
-    if after <= MOST_APPROXIMATE * before:
+    if after <= APPROXIMATE_LEFT * before:
         return None
     reason = _inadequate(findings) or _far_off(findings)
     names = tuple(candidate.name for candidate in chosen)
@@ -166,7 +147,7 @@ def _alike(findings: Findings) -> Reason | None:
     if alike is None:
         return None
     name, judged = alike
-    return Reason("alike", judged.common, SURELY, of=BY_QUANTITY[name].name, final=True)
+    return Reason("alike", judged.common, ALIKE_BESIDE, of=BY_QUANTITY[name].name, final=True)
 
 
 def _undetermined(findings: Findings) -> Reason | None:
@@ -186,10 +167,10 @@ def _undetermined(findings: Findings) -> Reason | None:
             if amplitude and path in candidate.fitted_paths
         ]
         sizes.append(max((abs(size - none) / error for size, error, none in known), default=np.inf))
-    undetermined = [size for size in sizes if size < ABSENT]
-    if len(undetermined) < 2:
+    undetermined = [size for size in sizes if size < CONFIDENCE]
+    if len(undetermined) <= 1:
         return None
-    return Reason("undetermined", max(undetermined), ABSENT, final=True)
+    return Reason("undetermined", max(undetermined), CONFIDENCE, final=True)
 
 
 def _drawn_by_shapes(findings: Findings, much: bool) -> Reason | None:
@@ -209,7 +190,7 @@ def _drawn_by_shapes(findings: Findings, much: bool) -> Reason | None:
             drawing.append(candidate.effect)
             drawing += [rival.candidate.effect for rival in rivals if rival.equal and much]
     drawing = [name for name in drawing if _of_place(name)]
-    if len(drawing) < 2:
+    if len(drawing) <= 1:
         return None
     sizes = left_in_noises(findings.problem, findings.selection.fit, chosen)
     name = max(sizes, key=lambda each: sizes[each])
@@ -229,9 +210,9 @@ def _far_off(findings: Findings) -> Reason | None:
     selection = findings.selection
     sizes = left_in_noises(findings.problem, selection.fit, selection.chosen)
     name = max(sizes, key=lambda each: sizes[each])
-    if sizes[name] <= FAR:
+    if sizes[name] <= LARGEST_NOISE:
         return None
-    return Reason("misfit", sizes[name], FAR, of=BY_QUANTITY[name].name)
+    return Reason("misfit", sizes[name], LARGEST_NOISE, of=BY_QUANTITY[name].name)
 
 
 def _beyond(
@@ -242,8 +223,8 @@ def _beyond(
         return _unexplained(findings)
     if not gate(findings):
         return None
-    if left.slow > MOST_LEFT:
-        return Reason("slow", left.slow, MOST_LEFT)
+    if left.slow > SLOW_LEFT:
+        return Reason("slow", left.slow, SLOW_LEFT)
     if left.autocorrelated > MOST_AUTOCORRELATED:
         return Reason("autocorrelated", left.autocorrelated, MOST_AUTOCORRELATED)
     return _scatters(findings, left) or _outdone(findings, laws)
@@ -267,7 +248,7 @@ def _inadequate(findings: Findings) -> Reason | None:
     column = BY_QUANTITY[name].name
     if signal.fault == "explained":
         return Reason("explained", signal.explained, MOST_EXPLAINED, of=column)
-    return Reason("misfit", signal.fitted, MOST_FLOORS, of=column)
+    return Reason("misfit", signal.fitted, COMPLETE, of=column)
 
 
 def _unexplained(findings: Findings) -> Reason | None:
@@ -281,7 +262,7 @@ def _unexplained(findings: Findings) -> Reason | None:
     if not sure:
         return _inadequate(findings)
     signal = max(sure, key=lambda name: sure[name].score)
-    return Reason("unexplained", sure[signal].score, SURE, of=BY_QUANTITY[signal].name)
+    return Reason("unexplained", sure[signal].score, CERTAIN, of=BY_QUANTITY[signal].name)
 
 
 def _nearest(findings: Findings) -> tuple[str, float]:
@@ -340,7 +321,7 @@ def _outdone(findings: Findings, laws: Sequence[EstimatedLaw]) -> Reason | None:
     whitened = selection.problem.whitened_residuals(findings.refitted.model)
     before = whitened.sums(findings.refitted.values, np.empty(0)).chi_square
     gain = before - selection.fit.chi_square
-    limit = max(BETTER * gain, gain + BETTER_BY)
+    limit = max(SHAPE_FACTOR * gain, gain + SHAPE_GAIN)
     if laws[0].gain > limit:
         return Reason("outdone", laws[0].gain, limit, of=laws[0].name, gain=gain)
     return None
@@ -353,4 +334,4 @@ def telling(findings: Findings, laws: Sequence[EstimatedLaw]) -> bool:
     whitened = findings.selection.problem.whitened_residuals(findings.refitted.model)
     count = sum(logged.count for logged in whitened.logged)
     before = whitened.sums(findings.refitted.values, np.empty(0)).chi_square
-    return laws[0].gain > max(BETTER_BY, WORTH_DRAWING * (before - count))
+    return laws[0].gain > max(SHAPE_GAIN, WORTH_DRAWING * (before - count))

@@ -6,20 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pma_gym.discovery.result.misfit import TrialRecord
+from pma_gym.discovery.thresholds import BLOCK_S, SIGNIFICANT, WORSE_BLOCKS, WORSE_FLOORS
 
 Array = NDArray[np.float64]
-
-BLOCK_S = 1.0
-"""Length of the bootstrap's blocks (s)."""
-
-CHANCE = 0.05
-"""That any signal or trial is named although it is fitted no worse."""
-
-LEAST_BLOCKS = 4
-"""Fewest blocks whose bootstrap means anything."""
-
-WORTH_SAYING = 0.05
-"""Growth of a misfit (root mean square) that is worth a word, in noise floors."""
 
 
 def worsened(
@@ -41,7 +30,7 @@ def worsened(
         level = floors[name]
         sums = np.concatenate([part[0] for part in growth[name]])
         counts = np.concatenate([part[1] for part in growth[name]])
-        if _grows(sums / level**2, counts, CHANCE / tests, [seed, number]):
+        if _grows(sums / level**2, counts, SIGNIFICANT / tests, [seed, number]):
             signals.append(name)
     for number, record in enumerate(records):
         parts = [
@@ -50,7 +39,7 @@ def worsened(
         if not parts:
             continue
         sums, counts = (np.sum([part[k] for part in parts], axis=0) for k in (0, 1))
-        if len(records) > 1 and _grows(sums, counts, CHANCE / tests, [seed, 100 + number]):
+        if len(records) > 1 and _grows(sums, counts, SIGNIFICANT / tests, [seed, 100 + number]):
             trials.append(record.name)
     return tuple(signals), tuple(trials)
 
@@ -78,7 +67,7 @@ def _grows(sums: Array, counts: Array, chance: float, seed: Sequence[int]) -> bo
     there = counts > 0.0
     sums, counts = sums[there], counts[there]
     blocks = len(counts)
-    if blocks < LEAST_BLOCKS or sums.sum() <= WORTH_SAYING**2 * counts.sum():
+    if blocks < WORSE_BLOCKS or sums.sum() <= WORSE_FLOORS**2 * counts.sum():
         return False
     drawn = np.random.default_rng(seed).multinomial(blocks, np.full(blocks, 1.0 / blocks), 4000)
     means = (drawn @ sums) / np.maximum(drawn @ counts, 1.0)

@@ -46,7 +46,7 @@ def test_the_given_model_is_proposed_where_no_parameter_is_off():
 
 
 def test_what_is_off_but_hardly_shows_leaves_the_model_as_it_is(monkeypatch):
-    monkeypatch.setattr(decision, "MOVED_CHANGE", np.inf)
+    monkeypatch.setattr(decision, "SLIGHT", np.inf)
     diagnosis = diagnose(laboratory("parameters", 6)[0], STATION, propose=False)
     assert diagnosis.verdict == "agrees" and diagnosis.model == STATION
     (words,) = said(diagnosis)

@@ -27,7 +27,7 @@ def test_an_effect_of_no_one_size_is_named_with_what_it_leaves(monkeypatch):
         rig = STATION.with_effects({"hysteresis": {"force_n": size, "distance_mm": 1.0}})
         trials.append(Plant(rig).simulate(trial, seed=k))
     # Its law leaves 20 %: what of it is left after others were refitted is not much.
-    monkeypatch.setattr(approximate, "MOST_LEFT", 0.25)
+    monkeypatch.setattr(approximate, "APPROXIMATE_LEFT", 0.25)
     diagnosis = diagnose(trials, STATION, propose=False)
     (effect,), known = diagnosis.effects, diagnosis.approximate
     assert (diagnosis.verdict, effect.name) == ("effect", "hysteresis"), diagnosis.sentence

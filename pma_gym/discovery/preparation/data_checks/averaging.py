@@ -20,6 +20,14 @@ from pma_gym.data.datasets.dataset import NamedTrial
 from pma_gym.data.trial import Trial
 from pma_gym.discovery.preparation.mains_lines import HARMONICS, MAINS_HZ, is_detectable
 from pma_gym.discovery.preparation.noise import level_of_neighbours
+from pma_gym.discovery.thresholds import (
+    JUMP,
+    LEAST_RATE_HZ,
+    LINE_PASSES,
+    NEAR_NYQUIST_HZ,
+    RARE,
+    WORTH_AVERAGING,
+)
 
 Array = NDArray[np.float64]
 
@@ -29,30 +37,11 @@ MOST_ROWS = 60_000
 AIM_ROWS = 16_000
 """Rows that are aimed at then."""
 
-SLOWEST_HZ = 60.0
-"""Least rate that is left: slower would hide the rotor's oscillation on the cable."""
-
-PASSES = 0.2
-"""Largest share of a line of mains that averages may leave where it is not looked for, if any block
-keeps to it. An assumption."""
-
-NYQUIST_HZ = 1.0
-"""How near to half the rate that is left a line may lie. An assumption."""
-
 PARABOLA = 4
 """Fewest readings that a parabola is drawn through."""
 
 SAME = 1e-3
 """Share of the rows' distance within which two times are one."""
-
-WORTH = 0.5
-"""Most rows that trials of one rate may keep, as a share of their own: a command that changes in
-every row, as a noisy controller's does, needs them all, and averages of readings would only hide
-the fastest. Trials of one rate are averaged all or none, for they share one noise."""
-
-JUMP, RARE = 4.0, 0.05
-"""Noises off its parabola from which on a block jumps, and the share of blocks that may: where more
-are, readings are as fast as that all the time."""
 
 CURVATURE, UNSEEN = 1e-4, 0.25
 """Largest change of a command by leaving rows out, as a share of its span: so much at most, and so
@@ -78,7 +67,7 @@ def averaged(named: Sequence[NamedTrial]) -> tuple[list[NamedTrial], list[str]]:
         of_rate = [k for k, each in enumerate(factors) if each == factor]
         fewer = {k: _fewer(named[k].trial, factor, off) for k in of_rate}
         rows = sum(len(named[k].trial) for k in of_rate)
-        if sum(map(len, fewer.values())) > WORTH * rows:
+        if sum(map(len, fewer.values())) > WORTH_AVERAGING * rows:
             factors = [1 if each == factor else each for each in factors]
             continue
         for k, trial in fewer.items():
@@ -103,10 +92,10 @@ def _rate(trial: Trial) -> float:
 
 def _factor(rate: float, wanted: int) -> int:
     """Rows of a block: as wanted, or as many fewer (to half) as the lines of mains ask for."""
-    most = max(1, min(wanted, int(rate / SLOWEST_HZ)))
+    most = max(1, min(wanted, int(rate / LEAST_RATE_HZ)))
     tried = range(most, most // 2, -1)
     passed = [_undetectable(rate, factor) for factor in tried]
-    clear = [factor for factor, share in zip(tried, passed, strict=True) if share <= PASSES]
+    clear = [factor for factor, share in zip(tried, passed, strict=True) if share <= LINE_PASSES]
     return clear[0] if clear else tried[int(np.argmin(passed))]
 
 
@@ -121,8 +110,8 @@ def _undetectable(rate: float, factor: int) -> float:
     lines = [mains * harmonic for mains in MAINS_HZ for harmonic in HARMONICS]
     return max(
         abs(float(_weights(factor) @ np.cos(2.0 * np.pi * hertz * at)))
-        if is_detectable(hertz, rate, NYQUIST_HZ)
-        and not is_detectable(hertz, rate / factor, NYQUIST_HZ)
+        if is_detectable(hertz, rate, NEAR_NYQUIST_HZ)
+        and not is_detectable(hertz, rate / factor, NEAR_NYQUIST_HZ)
         else 0.0
         for hertz in lines
     )

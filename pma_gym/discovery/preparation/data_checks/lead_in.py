@@ -11,13 +11,11 @@ from numpy.typing import NDArray
 
 from pma_gym.data.datasets.dataset import NamedTrial
 from pma_gym.data.trial import Trial
+from pma_gym.discovery.thresholds import WORTH_A_LEAD_IN
 from pma_gym.plant.model import Model
 
 LEAD_S = 1.0
 """Duration of a lead-in (s)."""
-
-MOVING = 0.05
-"""Share of a record's stroke that a lead-in must cover to be worth its rows."""
 
 FIRST_ROWS = 8
 """Least number of first rows that the velocity is taken from."""
@@ -36,7 +34,7 @@ def with_lead_in(named: NamedTrial, model: Model) -> NamedTrial:
     if positions is None or len(trial.time) < FIRST_ROWS or np.isnan(positions).any():
         return named
     begin, rate = _beginning(trial.time, positions, model.parameters["imposed_motion"].bandwidth)
-    if abs(rate) * LEAD_S < MOVING * float(np.ptp(positions)):
+    if abs(rate) * LEAD_S < WORTH_A_LEAD_IN * float(np.ptp(positions)):
         return named
     step = float(np.median(np.diff(trial.time)))
     before = trial.time[0] - step * np.arange(max(1, round(LEAD_S / step)), 0, -1)

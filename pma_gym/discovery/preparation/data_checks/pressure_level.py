@@ -16,25 +16,19 @@ from pma_gym.data.signals import SIGNALS
 from pma_gym.data.trial import Trial
 from pma_gym.discovery.preparation.data_checks.simulated import Pair, pairs
 from pma_gym.discovery.preparation.data_checks.units import ABSOLUTE, PRESSURE_UNITS, Unit
+from pma_gym.discovery.thresholds import (
+    BEYOND,
+    CLOSER,
+    CLOSER_OUTSIDE,
+    LEAST_ABSOLUTE_PA,
+    UNDOUBTED_M,
+)
 from pma_gym.plant.model import Model
 
 Array = NDArray[np.float64]
 
-LEAST = 80e3
-"""Least commanded pressure (Pa): the air's, on a mountain; less is no absolute pressure."""
-
 OTHER_SHIFTS = (160e3, 130e3, 70e3, 40e3, 0.0, -40e3)
 """Offsets of commanded pressures that absolute pressures are compared with (Pa)."""
-
-CLOSER, CLOSER_OUTSIDE = 0.4, 0.6
-"""Largest share of the misfit that is left once the pressures are corrected: of commands that lie
-inside the model's range as they are, and outside."""
-
-BEYOND = 1.2
-"""How far the highest command may lie beyond the model's range, as a factor."""
-
-_NEEDED = 1e-3
-"""Rms misfit of contraction (m) below which the commands are not doubted."""
 
 _JUDGES = {"contraction": 1.0, "rotation": 0.025}
 """Motions that pressure shows in, with the metres of contraction that one unit (SI) of each is."""
@@ -75,7 +69,7 @@ def pressure_level(model: Model, trials: Sequence[Trial]) -> Level | None:
     inside = (validity.lowest, BEYOND * validity.highest)
     is_outside = high < inside[0] or inside[1] < low
     if not is_outside:
-        units = [ABSOLUTE] if low >= LEAST else []
+        units = [ABSOLUTE] if low >= LEAST_ABSOLUTE_PA else []
     units = [unit for unit in units if inside[0] <= unit.corrected(np.array(high)) <= inside[1]]
     if not units:
         return None
@@ -87,7 +81,7 @@ def pressure_level(model: Model, trials: Sequence[Trial]) -> Level | None:
     best = min(misfits, key=lambda unit: misfits[unit])
     given = misfits[Unit(1.0, "")]
     most = (CLOSER_OUTSIDE if is_outside else CLOSER) * given
-    if best not in units or given < _NEEDED or misfits[best] > most:
+    if best not in units or given < UNDOUBTED_M or misfits[best] > most:
         return None
     valid = (validity.lowest, validity.highest)
     return Level(best, (low, high), valid, given, misfits[best])

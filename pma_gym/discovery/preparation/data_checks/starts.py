@@ -15,6 +15,15 @@ from numpy.typing import NDArray
 from pma_gym.data.signals import SIGNALS
 from pma_gym.data.trial import Trial
 from pma_gym.data.trial_columns import BY_QUANTITY
+from pma_gym.discovery.thresholds import (
+    BETTER_BEGINNING,
+    CERTAIN,
+    FORGOTTEN,
+    LEAST_COUNTED,
+    LEAST_FORGETTING_S,
+    LONGER,
+    MOVING_SLOPE,
+)
 from pma_gym.plant import sensors
 from pma_gym.plant.model import Model
 from pma_gym.plant.plant import Plant
@@ -28,28 +37,9 @@ FIRST_S = 0.15
 SPEED_S, SPEED_ROWS = 0.06, 6
 """Time (s) and least rows over which the first speed is measured."""
 
-SURE = 6.0
-"""Standard errors of the first speed that show motion."""
-
-BETTER = 0.5
-"""Largest share of the misfit of a beginning at rest that one in motion leaves."""
-
 LAST_S, SWEEP_S, AT_REST_S = 0.3, 1.0, 0.3
 """Time of the way there that has the first speed of the commands; time that it takes for their
 whole range; time at rest before it (s)."""
-
-FORGOTTEN = 0.5
-"""Standard deviations of a sensor below which the way there no longer shows."""
-
-LONGER = 1.5
-"""How many times as long as the model needs the way there is left to be forgotten: a rig may be
-slower than its model."""
-
-LEAST_S = 0.1
-"""Least time after which readings count (s)."""
-
-LEAST_LEFT = 0.5
-"""Smallest share of a trial whose readings must still count."""
 
 
 @dataclass(frozen=True)
@@ -109,7 +99,7 @@ def moving_start(plant: Plant, trial: Trial) -> str:
     except ValueError:
         return ""
     misfits = np.array([_misfit(plant.model, trial, part, first) for part in (rest, moved)])
-    return _said_speed(quantity, speed) if misfits[1] <= BETTER * misfits[0] else ""
+    return _said_speed(quantity, speed) if misfits[1] <= BETTER_BEGINNING * misfits[0] else ""
 
 
 def with_start(plant: Plant, trial: Trial, whole: Trial, moving: str) -> Start | None:
@@ -132,8 +122,8 @@ def with_start(plant: Plant, trial: Trial, whole: Trial, moving: str) -> Start |
     apart = np.any(np.abs(other - rest)[measured] > scale[measured, None], axis=0)
     last = int(np.flatnonzero(apart)[-1]) if apart.any() else 0
     begin = float(trial.time[0])
-    counts_from = begin + max(LEAST_S, LONGER * (float(trial.time[last]) - begin))
-    if float(trial.time[-1]) - counts_from < LEAST_LEFT * trial.duration:
+    counts_from = begin + max(LEAST_FORGETTING_S, LONGER * (float(trial.time[last]) - begin))
+    if float(trial.time[-1]) - counts_from < LEAST_COUNTED * trial.duration:
         return None
     chosen = trial if way is None else way
     late = chosen.time < counts_from
@@ -206,7 +196,11 @@ def _first_speed(trial: Trial, quantity: str) -> tuple[str, float, float] | None
     line = float(np.polyfit(time[:count], values[:count], 1)[0])
     error = noise / float(np.sqrt(np.sum((time[:count] - time[:count].mean()) ** 2)))
     sure = abs(line) / error
-    if sure < SURE or abs(line) < SIGNALS[quantity].least_rate or coefficients[1] / line < 0.3:
+    if (
+        sure < CERTAIN
+        or abs(line) < SIGNALS[quantity].least_rate
+        or coefficients[1] / line < MOVING_SLOPE
+    ):
         return None
     return quantity, line, sure
 

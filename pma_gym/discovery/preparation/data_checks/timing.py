@@ -13,24 +13,22 @@ from pma_gym.data.signals import SIGNALS
 from pma_gym.data.trial import MEASUREMENTS
 from pma_gym.data.trial_columns import BY_QUANTITY
 from pma_gym.discovery.preparation.data_checks.simulated import Pair
-from pma_gym.discovery.preparation.data_checks.units import ALIKE
+from pma_gym.discovery.thresholds import (
+    CORRELATED,
+    LAG_LEFT,
+    LEAST_LAG_ROWS,
+    LEAST_LAG_S,
+    SAME_LAG,
+    SINGLE_LAG_S,
+)
 
 Array = NDArray[np.float64]
 
 MOST_S = 0.25
 """Longest lag that is looked for (s)."""
 
-LEAST_S, LEAST_ROWS = 3e-3, 0.3
-"""Shortest lag that is named: in s, and in rows."""
-
-GAIN = 0.3
-"""Largest share of the misfit's square that is left once a signal is shifted by its lag."""
-
-SAME = 0.2
-"""Largest share by which lags of several signals may differ."""
-
-ALONE_S = 10e-3
-"""Shortest lag of a single signal that is named (s): what parameters can do is less."""
+LEAST_READINGS, LEAST_INNER = 20, 10
+"""Fewest readings that tell a lag, in all and away from the ends."""
 
 DIRECT = ("load", "pressure")
 """Signals that follow their commands straight. Friction and hysteresis make motion late, alone."""
@@ -52,7 +50,7 @@ def words(late: dict[str, float]) -> list[str]:
     said, left = [], dict(late)
     while left:
         lag = max(left.values())
-        together = [name for name, other in left.items() if lag - other <= SAME * lag]
+        together = [name for name, other in left.items() if lag - other <= SAME_LAG * lag]
         left = {name: other for name, other in left.items() if name not in together}
         names = ", ".join(BY_QUANTITY[name].name for name in together)
         mean = 1e3 * float(np.mean([late[name] for name in together]))
@@ -63,7 +61,7 @@ def words(late: dict[str, float]) -> list[str]:
                 "the logger stamps its readings later than its commands, or the drive is late; "
                 "check the logger before you believe a delay of the drive"
             )
-        elif len(together) == 1 and lag >= ALONE_S and (direct or len(late) == 1):
+        elif len(together) == 1 and lag >= SINGLE_LAG_S and (direct or len(late) == 1):
             said.append(
                 f"{names} alone is late, by {mean:.3g} ms after the model's simulation, whose "
                 "parameters move this figure: its sensor lags, or another clock stamps its "
@@ -75,9 +73,9 @@ def words(late: dict[str, float]) -> list[str]:
 def _lag(pair: Pair, quantity: str) -> tuple[float, bool] | None:
     """Lag of a signal (s), and whether it is clear; None where the signal hardly moves."""
     time, simulated, measured = pair.signal(quantity)
-    if time.size < 20 or np.ptp(simulated) <= SIGNALS[quantity].least_span:
+    if time.size < LEAST_READINGS or np.ptp(simulated) <= SIGNALS[quantity].least_span:
         return None
-    if abs(float(np.corrcoef(simulated, measured)[0, 1])) < ALIKE / 2.0:
+    if abs(float(np.corrcoef(simulated, measured)[0, 1])) < CORRELATED / 2.0:
         return None
     row = float(np.median(np.diff(time)))
     step = max(row / 4.0, 1e-3)
@@ -90,14 +88,14 @@ def _lag(pair: Pair, quantity: str) -> tuple[float, bool] | None:
         curvature = before - 2.0 * here + after
         lag += step * 0.5 * (before - after) / curvature if curvature > 0.0 else 0.0
     none = _left(time, simulated, measured, 0.0)
-    clear = lag >= max(LEAST_S, LEAST_ROWS * row) and left[at] <= GAIN * none
+    clear = lag >= max(LEAST_LAG_S, LEAST_LAG_ROWS * row) and left[at] <= LAG_LEFT * none
     return lag, bool(clear and at < len(tried) - 1)
 
 
 def _left(time: Array, simulated: Array, measured: Array, lag: float) -> float:
     """Square of what the simulated signal, so late and times a factor, leaves."""
     inner = (time > time[0] + MOST_S) & (time < time[-1] - 0.05)
-    if inner.sum() < 10:
+    if inner.sum() < LEAST_INNER:
         inner[:] = True
     late = np.interp(time - lag, time, simulated)[inner]
     columns = np.stack([late, np.ones(late.size)], axis=1)

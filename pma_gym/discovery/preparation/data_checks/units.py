@@ -14,6 +14,15 @@ from numpy.typing import NDArray
 
 from pma_gym.data.signals import SIGNALS
 from pma_gym.discovery.preparation.data_checks.simulated import ATMOSPHERE, Pair
+from pma_gym.discovery.thresholds import (
+    AS_GIVEN,
+    CORRELATED,
+    NEAR_LEVEL,
+    NEAR_UNIT,
+    PRESSURE_FAR,
+    PRESSURE_NEAR,
+    WEATHER_PA,
+)
 
 Array = NDArray[np.float64]
 
@@ -109,24 +118,8 @@ PRESSURE_COMMAND_UNITS = (
     Unit(1.0, "absolute pressure", -ATMOSPHERE, command=True),
 )
 
-ALIKE = 0.9
-"""Least correlation of measured and simulated that shows a slope."""
-
-AS_GIVEN = (0.35, 2.8)
-"""Slopes that a wrong model may give: no unit is looked for there."""
-
-NEAR = {"contraction": 0.4, "rotation": 0.4, "load": 0.25}
-"""Largest distance of a slope's logarithm from a unit's, by what the model may be wrong about."""
-
-LEVEL = 0.25
-"""Largest share that a level may be off the unit's."""
-
-PRESSURE_NEAR, PRESSURE_FAR = 0.06, 0.15
-"""Largest share that a pressure may be off what a unit gives; least that it is off otherwise. A
-regulator holds its pressure, but for the local weather (+-5 kPa) and its own faults."""
-
-WEATHER = 16e3
-"""How much less than the standard pressure the air of a high town has (Pa)."""
+LEAST_READINGS = 8
+"""Fewest readings that tell a slope."""
 
 MOST_LAG_S, LAGS = 0.3, 61
 """How late a signal may be for its slope; how many lags are tried."""
@@ -152,7 +145,7 @@ def slope_of(pair: Pair, quantity: str) -> Slope | None:
     """Robust slope of a measured signal on the simulated one; None where it hardly moves."""
     time, simulated, measured = pair.signal(quantity)
     least = SIGNALS[quantity].least_span
-    if time.size < 8 or np.ptp(simulated) <= least or np.ptp(measured) == 0.0:
+    if time.size < LEAST_READINGS or np.ptp(simulated) <= least or np.ptp(measured) == 0.0:
         return None
     best = max(_correlations(time, simulated, measured), key=lambda each: abs(each[0]) + each[2])
     alike, lag, _ = best
@@ -203,12 +196,12 @@ def motion_unit(quantity: str, pair: Pair) -> Unit | None:
         pair: a trial beside its simulation.
     """
     seen = slope_of(pair, quantity)
-    if seen is None or abs(seen.alike) < ALIKE or AS_GIVEN[0] <= seen.slope <= AS_GIVEN[1]:
+    if seen is None or abs(seen.alike) < CORRELATED or AS_GIVEN[0] <= seen.slope <= AS_GIVEN[1]:
         return None
     units = MOTION_UNITS[quantity]
     if _asks_for(pair, "load_command"):
         units += COMMAND_UNITS.get(quantity, ())
-    fitting = [unit for unit in units if _distance(seen.slope, unit.factor) < NEAR[quantity]]
+    fitting = [unit for unit in units if _distance(seen.slope, unit.factor) < NEAR_UNIT[quantity]]
     if not fitting:
         return None
     unit = min(fitting, key=lambda each: _distance(seen.slope, each.factor))
@@ -235,13 +228,13 @@ def _is_borne_out(quantity: str, pair: Pair, seen: Slope, unit: Unit) -> bool:
     if unit.factor == -1.0 or SIGNALS[quantity].is_force:
         # No physics turns a motion round; a drive's load follows its command.
         return True
-    if abs(seen.level / unit.factor - 1.0) < LEVEL:
+    if abs(seen.level / unit.factor - 1.0) < NEAR_LEVEL:
         return True
     other = _WITNESS[quantity]
     witness = slope_of(pair, other)
     return (
         witness is not None
-        and abs(witness.alike) >= ALIKE
+        and abs(witness.alike) >= CORRELATED
         and AS_GIVEN[0] <= abs(witness.slope) <= AS_GIVEN[1]
     )
 
@@ -284,7 +277,7 @@ def _off(simulated: Array, measured: Array, unit: Unit) -> float:
     if unit.offset:
         # The air of a high town weighs less: its share is not held against the unit.
         shift = float(np.median(measured - expected))
-        allowed = abs(unit.factor) * WEATHER
+        allowed = abs(unit.factor) * WEATHER_PA
         if -allowed < np.sign(unit.offset) * shift < allowed / 4.0:
             away = np.median(np.abs(measured - expected - shift)) / scale
     return float(away)

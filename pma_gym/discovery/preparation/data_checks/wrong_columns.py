@@ -15,16 +15,13 @@ from pma_gym.discovery.preparation.data_checks.simulated import ATMOSPHERE, Pair
 from pma_gym.discovery.preparation.data_checks.units import (
     ABSOLUTE,
     MOTION_UNITS,
-    PRESSURE_FAR,
     Unit,
     motion_unit,
     pressure_unit,
     slope_of,
 )
+from pma_gym.discovery.thresholds import FAR_ZERO_M, PRESSURE_FAR
 from pma_gym.plant.model import Model
-
-FAR_M = 0.02
-"""Distance from the simulated contraction (m) from which on a zero is proposed too."""
 
 COMMAND_OF = {"load": "load_command", "pressure": "pressure_command"}
 
@@ -110,7 +107,7 @@ def _zero(quantity: str, unit: Unit, simulated: Sequence[Pair]) -> float:
         return 0.0
     signals = [pair.signal(quantity)[1:] for pair in simulated]
     away = float(np.median([np.median(s) - np.median(m) / unit.factor for s, m in signals]))
-    return round(1e3 * away) * 1e-3 if abs(away) > FAR_M else 0.0
+    return round(1e3 * away) * 1e-3 if abs(away) > FAR_ZERO_M else 0.0
 
 
 def _of_pressure(
