@@ -8,10 +8,6 @@ Dead time of the commands: what comes out is what went in, a while ago.
 import numpy as np
 import pytest
 
-from pma_gym.codegen.derivative import derivatives
-from pma_gym.codegen.graph import CHANGING, FIXED, Graph
-from pma_gym.codegen.text import evaluate
-from pma_gym.codegen.trace import trace
 from pma_gym.data.serres2008 import load_table
 from pma_gym.effects import CATALOGUE
 from pma_gym.effects.arithmetic import cosine
@@ -76,20 +72,6 @@ def test_a_dead_zone_neither_pushes_nor_falls_and_ends(slope):
     # Without a width the slope does nothing.
     for load in (0.0, 1e-300, 1e-9, 0.1, 1.0 / 3.0, 976.0):
         assert load_beyond_dead_zone(load, none) == load
-
-
-@pytest.mark.parametrize("name", TWO_WAY)
-def test_slopes_of_a_drive_of_either_sign_are_differences(name):
-    effect, values = CATALOGUE[name], TWO_WAY[name][0]
-    graph, size = Graph(), next(iter(values.values()))
-    load, own = graph.input("load", CHANGING), graph.input("own", FIXED)
-    force = trace(effect.law, load, effect.parameters(own))
-    at = {"load": np.linspace(-40.0, 40.0, 12), "own": np.full(12, size)}
-    for name, slope in zip(at, derivatives([force], [load, own])[0], strict=True):
-        ends = [evaluate([force], {**at, name: at[name] + step})[0] for step in (-1e-4, 1e-4)]
-        np.testing.assert_allclose(
-            evaluate([slope], at)[0], (ends[1] - ends[0]) / 2e-4, rtol=1e-7, atol=1e-7
-        )
 
 
 @pytest.mark.parametrize("share", [1.0, 0.4])
