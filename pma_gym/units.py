@@ -34,6 +34,7 @@ SI_FACTORS: dict[str, float] = {
     "lbf": 4.4482216152605,
     "kip": 4448.2216152605,
     "N m": 1.0,
+    "N or N m": 1.0,
     "Pa": 1.0,
     "kPa": 1e3,
     "bar": 1e5,

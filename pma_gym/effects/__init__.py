@@ -29,7 +29,7 @@ from pma_gym.effects.drive.bearing_friction import BEARING_FRICTION
 from pma_gym.effects.drive.current_imbalance import CURRENT_IMBALANCE
 from pma_gym.effects.drive.directional_gain import DIRECTIONAL_GAIN
 from pma_gym.effects.drive.drive import DRIVE
-from pma_gym.effects.drive.drive_dead_zone import DRIVE_DEAD_ZONE
+from pma_gym.effects.drive.drive_dead_zone import DRIVE_DEAD_BAND, DRIVE_DEAD_ZONE
 from pma_gym.effects.drive.drive_lag import DRIVE_LAG
 from pma_gym.effects.drive.drive_saturation import DRIVE_SATURATION
 from pma_gym.effects.drive.position_map import POSITION_MAP
@@ -174,6 +174,7 @@ CATALOGUE: dict[str, Effect] = {
         JOINT_HARDENING_SPRING,
         LOAD_DEPENDENT_FRICTION,
         JOINT_LOAD_FRICTION,
+        DRIVE_DEAD_BAND,
         DIRECTIONAL_GAIN,
         CONSTANT_TORQUE,
         INERTIA,

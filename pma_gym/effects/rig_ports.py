@@ -24,6 +24,12 @@ _CARRYING = (*_TURNING, "carried_force")
 _MOVED = ("position", "contraction", "velocity", "pressure")
 _DELAY, _LAG = ("load_asked", "motor_voltage"), ("load_command", "motor_voltage")
 
+_SHAPE = Port(
+    "force of the drive (N, N m), changed by one effect after the other",
+    signals=("load", "velocity"),
+    absent="load",
+)
+
 SLIDE_PORTS: dict[str, Port] = {
     "slide_force": Port(
         "force on the slide (N), added; positive in the direction of contraction",
@@ -45,6 +51,7 @@ SLIDE_PORTS: dict[str, Port] = {
     "drive_lag": Port(
         "load that arrives at the slide (N)", most=1, signals=_LAG, absent="load_command"
     ),
+    "two_way_shape": _SHAPE,
     "drive_gain": Port(
         "force of the drive besides (N), added; positive as the contraction grows",
         signals=_DRIVEN,
@@ -69,6 +76,7 @@ JOINT_PORTS: dict[str, Port] = {
     "drive_lag": Port(
         "command that arrives at the joint (N m, V)", most=1, signals=_LAG, absent="load_command"
     ),
+    "two_way_shape": _SHAPE,
     "drive_gain": Port("torque of the drive besides (N m), added", signals=_TURNING, absent=0.0),
     "joint_drive_loss": Port(
         "torque that the drive loses on its way (N m), added", signals=_CARRYING, absent=0.0

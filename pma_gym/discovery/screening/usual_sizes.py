@@ -38,6 +38,7 @@ PERIODIC = "1/m"
 DIMENSIONS: dict[str, tuple[int, int, int, int]] = {
     "N": (1, 0, 0, 0),
     "N m": (1, 0, 0, 0),
+    "N or N m": (1, 0, 0, 0),
     "N s/mm": (1, -1, 0, 0),
     "N m s": (1, -1, 0, 0),
     "N s^2/mm^2": (1, -2, 0, 0),

@@ -34,7 +34,8 @@ def write_equations(equations: PlantEquations) -> None:
     eq.let("load_asked", eq["motor_voltage"])
     eq.let("load_command", eq.passed("drive_delay", "load_asked"))
     eq.let("command", eq.passed("drive_lag", "load_command"))
-    eq.let("drive_force", eq.one("joint_drive"))
+    eq.let("load", eq.one("joint_drive"))
+    eq.let("drive_force", eq.chain("two_way_shape", "load", eq["load"]))
     eq.let("drive_force", eq["drive_force"] + eq.total("drive_gain"))
     eq.let("carried_force", eq.total("joint_load"))
     torque = eq["drive_force"] + eq["carried_force"]

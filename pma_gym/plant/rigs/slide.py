@@ -53,7 +53,8 @@ def write_equations(equations: PlantEquations) -> None:
     eq.let("load_arriving", eq.passed("drive_lag", "load_command"))
     eq.let("position", eq["contraction"])
     # What pulls the slide out counts as backwards.
-    eq.let("drive_force", -eq["load_arriving"])
+    eq.let("load", -eq["load_arriving"])
+    eq.let("drive_force", eq.chain("two_way_shape", "load", eq["load"]))
     eq.let("drive_force", eq["drive_force"] + eq.total("drive_gain"))
     eq.let("carried_force", eq.total("contact_force"))
     eq.let("slide_force", eq.total("slide_force") + eq["carried_force"])
