@@ -34,12 +34,20 @@ RIGS = {
 
 
 def logs(
-    plant, seconds=4.0, begin=0.0, friction=(1.0, 1.0, 1.0), gain=(1.0, 1.0, 1.0), seed=1, bump=0.0
+    plant,
+    seconds=4.0,
+    begin=0.0,
+    friction=(1.0, 1.0, 1.0),
+    gain=(1.0, 1.0, 1.0),
+    seed=1,
+    bump=0.0,
+    drive=lambda force, position: force,
 ):
     """Three trials of a rig that a controller moves along sums of sines, from a time on.
 
     Friction and gain of each trial are in shares of the rig's own. Friction is an impulse that at
-    most stops the rig. A bump of force lies about 0.2 m or rad.
+    most stops the rig. A bump of force lies about 0.2 m or rad. `drive` is what a drive makes of a
+    command at a position.
     """
     inertia, damping, dry, (stiffness, rate_gain), size, noise, command, reading = RIGS[plant]
     generator, trials, step = np.random.default_rng(seed), [], 1.0 / RATE_HZ / SUBSTEPS
@@ -64,7 +72,7 @@ def logs(
             for _ in range(SUBSTEPS):
                 former = speed
                 hill = bump * exp(-50.0 * (position - 0.2) ** 2)
-                speed += kick * (gain[k] * force - damping * speed + hill)
+                speed += kick * (gain[k] * drive(force, position) - damping * speed + hill)
                 speed -= min(max(speed, -most), most)
                 position += 0.5 * step * (former + speed)
         cut = slice(round(begin * RATE_HZ), None)
@@ -326,6 +334,28 @@ def test_the_proposed_trial_tells_a_weight_from_a_spring_that_small_swings_do_no
     (decided,) = diagnose([*trials, swing(following.trial, 0.3, 9)[0]], known).effects
     assert (decided.name, decided.confused_with) == ("joint_weight", ())
     assert decided.parameters["moment_n_m"].value == pytest.approx(0.4, rel=0.01)
+
+
+HIDDEN = {
+    "drive_dead_band": (
+        lambda size: lambda force, x: force - min(max(force, -size), size),
+        {"slide": {"width_n_or_n_m": 3.0}},
+    ),
+}
+"""What a drive hides: its law by its sizes, and these by rig."""
+
+
+@pytest.mark.campaign
+@pytest.mark.parametrize(
+    ("name", "plant"), [(name, plant) for name in HIDDEN for plant in HIDDEN[name][1]]
+)
+def test_what_a_drive_does_is_named_with_its_size(plant, name):
+    law, truth = HIDDEN[name][0], HIDDEN[name][1][plant]
+    diagnosis = diagnosed(plant, NEAR[plant], drive=law(*truth.values()))
+    assert [each.name for each in diagnosis.effects] == [name], diagnosis.sentence
+    for path, value in truth.items():
+        size = diagnosis.effects[0].parameters[path]
+        assert size.low <= value <= size.high, (path, size)
 
 
 @pytest.mark.campaign
