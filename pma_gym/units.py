@@ -41,6 +41,7 @@ SI_FACTORS: dict[str, float] = {
     "1/kPa": 1e-3,
     "1/mm": 1e3,
     "1/m": 1.0,
+    "1/turn": 0.5 / math.pi,
     "1/%": 100.0,
     "1/N": 1.0,
     "mm/s": 1e-3,

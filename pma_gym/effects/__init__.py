@@ -4,7 +4,7 @@ from pma_gym.effects.cable.cable import CABLE
 from pma_gym.effects.cable.hanging_load import HANGING_LOAD
 from pma_gym.effects.cable.leg import LEG
 from pma_gym.effects.contact.backlash import BACKLASH
-from pma_gym.effects.contact.cogging import COGGING
+from pma_gym.effects.contact.cogging import COGGING, JOINT_COGGING
 from pma_gym.effects.contact.constant_force import CONSTANT_FORCE, CONSTANT_TORQUE
 from pma_gym.effects.contact.contact_friction import CONTACT_FRICTION, PRESSURE_FRICTION
 from pma_gym.effects.contact.directional_damping import (
@@ -186,6 +186,7 @@ CATALOGUE: dict[str, Effect] = {
         CONTACT_FRICTION,
         PRESSURE_FRICTION,
         COGGING,
+        JOINT_COGGING,
         BACKLASH,
         FORCE_SENSOR,
         FORCE_SENSOR_ERROR,

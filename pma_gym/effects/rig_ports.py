@@ -2,7 +2,7 @@
 
 A rig computes its signals one after the other, so a law reads those that are known at its port,
 and a rate law all of the rig. `tests/effects/test_user_effects.py` checks these tables against the
-rigs. The zero of a slide's position is free in every trial, so no law reads it.
+rigs. The zero of a slide's position is free in every trial, so no law of a user reads it.
 """
 
 from pma_gym.effects.effect import ANTAGONIST, Effect, antagonist, signals

@@ -32,8 +32,8 @@ SMOOTH_S = 0.03
 LEAST_ROWS = 8
 """Fewest readings of a trial that say how far it goes."""
 
-PERIODIC = "1/m"
-"""Unit of how often a force repeats over the position."""
+PERIODIC = "1/m", "1/turn"
+"""Units of how often a force repeats over the position."""
 
 DIMENSIONS: dict[str, tuple[int, int, int, int]] = {
     "N": (1, 0, 0, 0),
@@ -50,7 +50,7 @@ DIMENSIONS: dict[str, tuple[int, int, int, int]] = {
     "N/kPa": (1, 0, 0, -1),
     "mm/s": (0, 1, 0, 0),
     "deg/s": (0, 1, 0, 0),
-    PERIODIC: (0, 0, -1, 0),
+    **dict.fromkeys(PERIODIC, (0, 0, -1, 0)),
 }
 """Powers of force, speed, way and pressure in a unit, for those that scale with them."""
 
