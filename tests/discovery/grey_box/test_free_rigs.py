@@ -5,7 +5,7 @@ import subprocess
 import sys
 from dataclasses import replace
 from functools import cache
-from math import exp
+from math import cos, exp, radians
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +15,11 @@ from pma_gym import Plant
 from pma_gym.data.datasets.dataset import read_dataset
 from pma_gym.data.trial import Trial
 from pma_gym.discovery import diagnose
-from pma_gym.discovery.grey_box.latent_law import latent_law, latent_line
+from pma_gym.discovery.grey_box.latent_law import (
+    latent_law,
+    latent_line,
+    line_over_position,
+)
 from pma_gym.effects import CATALOGUE
 from pma_gym.effects.user_effects import load_effects
 from pma_gym.estimation.innovations import Point
@@ -341,6 +345,10 @@ HIDDEN = {
         lambda size: lambda force, x: force - min(max(force, -size), size),
         {"slide": {"width_n_or_n_m": 3.0}},
     ),
+    "joint_cogging": (
+        lambda size, often, phase: lambda force, x: force + size * cos(often * x + radians(phase)),
+        {"joint": {"amplitude_n_m": 0.08, "periods_per_turn": 12.0, "phase_deg": 40.0}},
+    ),
 }
 """What a drive hides: its law by its sizes, and these by rig."""
 
@@ -398,3 +406,12 @@ def test_a_latent_force_goes_with_a_place_or_oscillates_or_does_neither(force, g
     law = latent_law(trials, model("joint").rig, 10.0)
     assert (law and law.variable) == goes_with
     assert law or latent_line(trials) == (hertz and pytest.approx((hertz, 1.0), abs=0.1))
+
+
+@pytest.mark.parametrize("often", [2.0, 7.3, 40.0])
+def test_a_force_over_the_position_has_its_period_whatever_goes_with_the_place(often):
+    t = np.arange(2000) / RATE_HZ
+    x = 0.7 * np.sin(6.283 * 0.4 * t) + 0.3 * np.sin(6.283 * t)
+    force = 5.0 * np.sin(1.5 * x) + np.cos(6.283 * often * x + 0.3)
+    trial = Smoothed(t, force, 0.0 * t, x, 0.0 * t, 0.0 * t)
+    assert line_over_position([trial]) == pytest.approx(often, abs=0.25 / np.ptp(x))
