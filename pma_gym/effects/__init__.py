@@ -4,7 +4,7 @@ from pma_gym.effects.cable.cable import CABLE
 from pma_gym.effects.cable.hanging_load import HANGING_LOAD
 from pma_gym.effects.cable.leg import LEG
 from pma_gym.effects.contact.backlash import BACKLASH
-from pma_gym.effects.contact.cogging import COGGING
+from pma_gym.effects.contact.cogging import COGGING, JOINT_COGGING
 from pma_gym.effects.contact.constant_force import CONSTANT_FORCE, CONSTANT_TORQUE
 from pma_gym.effects.contact.contact_friction import CONTACT_FRICTION, PRESSURE_FRICTION
 from pma_gym.effects.contact.directional_damping import (
@@ -33,7 +33,7 @@ from pma_gym.effects.drive.bearing_friction import BEARING_FRICTION
 from pma_gym.effects.drive.current_imbalance import CURRENT_IMBALANCE
 from pma_gym.effects.drive.directional_gain import DIRECTIONAL_GAIN
 from pma_gym.effects.drive.drive import DRIVE
-from pma_gym.effects.drive.drive_dead_zone import DRIVE_DEAD_ZONE
+from pma_gym.effects.drive.drive_dead_zone import DRIVE_DEAD_BAND, DRIVE_DEAD_ZONE
 from pma_gym.effects.drive.drive_lag import DRIVE_LAG
 from pma_gym.effects.drive.drive_saturation import DRIVE_SATURATION
 from pma_gym.effects.drive.position_map import POSITION_MAP
@@ -180,6 +180,7 @@ CATALOGUE: dict[str, Effect] = {
         JOINT_LOAD_FRICTION,
         POSITION_FRICTION,
         JOINT_POSITION_FRICTION,
+        DRIVE_DEAD_BAND,
         DIRECTIONAL_GAIN,
         CONSTANT_TORQUE,
         INERTIA,
@@ -191,6 +192,7 @@ CATALOGUE: dict[str, Effect] = {
         CONTACT_FRICTION,
         PRESSURE_FRICTION,
         COGGING,
+        JOINT_COGGING,
         BACKLASH,
         FORCE_SENSOR,
         FORCE_SENSOR_ERROR,

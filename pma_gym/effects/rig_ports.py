@@ -2,7 +2,8 @@
 
 A rig computes its signals one after the other, so a law reads those that are known at its port,
 and a rate law all of the rig. `tests/effects/test_user_effects.py` checks these tables against the
-rigs. The zero of a slide's position may differ by trial, so none reads it but that of dry friction.
+rigs. The zero of a slide's position is free in every trial, so no law of a user reads it, but that
+of dry friction.
 """
 
 from pma_gym.effects.effect import ANTAGONIST, Effect, antagonist, signals
@@ -23,6 +24,12 @@ _TURNING = ("position", "angle", "velocity", "spin", "drive_force")
 _CARRYING = (*_TURNING, "carried_force")
 _MOVED = ("position", "contraction", "velocity", "pressure")
 _DELAY, _LAG = ("load_asked", "motor_voltage"), ("load_command", "motor_voltage")
+
+_SHAPE = Port(
+    "force of the drive (N, N m), changed by one effect after the other",
+    signals=("load", "velocity"),
+    absent="load",
+)
 
 SLIDE_PORTS: dict[str, Port] = {
     "dry_friction": Port(
@@ -50,6 +57,7 @@ SLIDE_PORTS: dict[str, Port] = {
     "drive_lag": Port(
         "load that arrives at the slide (N)", most=1, signals=_LAG, absent="load_command"
     ),
+    "two_way_shape": _SHAPE,
     "drive_gain": Port(
         "force of the drive besides (N), added; positive as the contraction grows",
         signals=_DRIVEN,
@@ -74,6 +82,7 @@ JOINT_PORTS: dict[str, Port] = {
     "drive_lag": Port(
         "command that arrives at the joint (N m, V)", most=1, signals=_LAG, absent="load_command"
     ),
+    "two_way_shape": _SHAPE,
     "drive_gain": Port("torque of the drive besides (N m), added", signals=_TURNING, absent=0.0),
     "joint_drive_loss": Port(
         "torque that the drive loses on its way (N m), added", signals=_CARRYING, absent=0.0

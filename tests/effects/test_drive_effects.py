@@ -8,7 +8,12 @@ Dead time of the commands: what comes out is what went in, a while ago.
 import numpy as np
 import pytest
 
+from pma_gym.codegen.derivative import derivatives
+from pma_gym.codegen.graph import CHANGING, FIXED, Graph
+from pma_gym.codegen.text import evaluate
+from pma_gym.codegen.trace import trace
 from pma_gym.data.serres2008 import load_table
+from pma_gym.data.trial import Trial
 from pma_gym.effects import CATALOGUE
 from pma_gym.effects.arithmetic import cosine
 from pma_gym.effects.delay import (
@@ -21,10 +26,12 @@ from pma_gym.effects.delay import (
 )
 from pma_gym.effects.drive.drive_dead_zone import load_beyond_dead_zone
 from pma_gym.effects.drive.drive_lag import late_load
+from pma_gym.effects.ports import STATION_PORTS
 from pma_gym.effects.sensors.sensor_delay import SensorDelay, late_reading, late_reading_rate
 from pma_gym.plant.equilibrium.solver import equilibria_at
 from pma_gym.plant.model import load_model
 from pma_gym.plant.plant import Plant
+from tests.discovery.grey_box.test_free_rigs import RIGS, model
 
 VOLTAGES = np.array([0.0, 0.1, 0.2, 0.3, 0.5, 1.0, 2.0, 4.0])
 
@@ -74,6 +81,44 @@ def test_a_dead_zone_neither_pushes_nor_falls_and_ends(slope):
         assert load_beyond_dead_zone(load, none) == load
 
 
+TWO_WAY = {
+    "drive_dead_band": ({"width_n_or_n_m": 15.0}, lambda f: f - np.clip(f, -15.0, 15.0)),
+}
+"""Effects of a drive of either sign: values, and the force of the drive (N, N m) with them."""
+
+
+@pytest.mark.parametrize("rig", ["slide", "joint"])
+@pytest.mark.parametrize("name", TWO_WAY)
+def test_a_drive_of_either_sign_accelerates_by_its_law(rig, name):
+    bare, (values, law) = model(rig, inertia=1.0), TWO_WAY[name]
+    command, pull = {"slide": ("load_command", -1.0), "joint": ("torque_command", 1.0)}[rig]
+    forces = np.linspace(-100.0, 100.0, 9)
+
+    def speeds(model, time):
+        trials = [Trial(time, {command: np.full(len(time), pull * force)}) for force in forces]
+        runs = [Plant(model).simulate(each, noise=False).measurements for each in trials]
+        return np.array([run[bare.rig.outputs[1]] for run in runs])
+
+    with_effect = speeds(bare.with_effects({name: values}), np.array([0.0, 1e-6]))
+    np.testing.assert_allclose(1e6 * RIGS[rig][0] * with_effect[:, -1], law(forces), rtol=1e-3)
+    absent, time = bare.with_effects([name]), np.linspace(0.0, 0.1, 21)
+    np.testing.assert_array_equal(speeds(absent, time), speeds(bare, time))
+
+
+@pytest.mark.parametrize("name", TWO_WAY)
+def test_slopes_of_a_drive_of_either_sign_are_differences(name):
+    effect, values = CATALOGUE[name], TWO_WAY[name][0]
+    graph, size = Graph(), next(iter(values.values()))
+    load, own = graph.input("load", CHANGING), graph.input("own", FIXED)
+    force = trace(effect.law, load, effect.parameters(own))
+    at = {"load": np.linspace(-40.0, 40.0, 12), "own": np.full(12, size)}
+    for name, slope in zip(at, derivatives([force], [load, own])[0], strict=True):
+        ends = [evaluate([force], {**at, name: at[name] + step})[0] for step in (-1e-4, 1e-4)]
+        np.testing.assert_allclose(
+            evaluate([slope], at)[0], (ends[1] - ends[0]) / 2e-4, rtol=1e-7, atol=1e-7
+        )
+
+
 @pytest.mark.parametrize("share", [1.0, 0.4])
 def test_a_late_drive_follows_a_step_exponentially(station_with, share):
     plant = station_with("drive_lag", share=share, time_constant_ms=20.0)
@@ -109,7 +154,8 @@ def test_ripple_comes_as_often_a_turn_as_it_says(station_with):
 
 def test_one_effect_of_the_drive_takes_what_the_one_before_gives():
     # In catalogue order: dead zone, limit, delay, lag, ripple, whatever order a file has.
-    names = [name for name in CATALOGUE if name.startswith("drive_") or name == "torque_ripple"]
+    names = [n for n in CATALOGUE if n.startswith("drive_") or n == "torque_ripple"]
+    names = [n for n in names if CATALOGUE[n].port in STATION_PORTS]
     shape = ["drive_dead_zone", "drive_saturation"]
     assert names == [*shape, "drive_delay", "drive_lag", "torque_ripple"]
 

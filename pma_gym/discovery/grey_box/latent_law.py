@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from pma_gym.data.trial_columns import BY_QUANTITY, Column
 from pma_gym.discovery.report.figure_text import capitalised, percent, signal_name
 from pma_gym.discovery.result.misfit import LatentForce, ResidualLaw
-from pma_gym.discovery.thresholds import CONFIDENCE, LEFT
+from pma_gym.discovery.thresholds import CONFIDENCE, LEFT, RIPPLE_PERIODS
 from pma_gym.estimation.innovations import PORTS, SPEEDS
 from pma_gym.estimation.smoother import Smoothed
 from pma_gym.plant.model import Model
@@ -28,8 +28,9 @@ BINS, LEAST_BINS = (12, 36), 3
 PARTS = 6
 """Of a single trial, each of which is left out once."""
 
-PERIODS, FINER = 3.0, 4
-"""Of a line in the shortest trial at least; points of its spectrum within its width."""
+PERIODS, FINER, CUBIC = 3.0, 4, 3
+"""Of a line in the shortest trial at least; points of its spectrum within its width; and the
+degree of what goes with the position smoothly, which the linear and cubic springs have."""
 
 
 def latent_law(trials: Sequence[Smoothed], rig: Rig, rows: float) -> ResidualLaw | None:
@@ -137,6 +138,22 @@ def latent_line(trials: Sequence[Smoothed]) -> tuple[float, float] | None:
     if share < LEFT or moved > LEFT and abs(line - motion) < 1.0 / shortest:
         return None
     return line, share
+
+
+def line_over_position(trials: Sequence[Smoothed]) -> float:
+    """Periods in a unit of the position (1/m, 1/rad) of the force's strongest line over it.
+
+    Of those that are seen to repeat, beside a cubic: a smooth law has no line.
+    """
+    force, position = (
+        np.concatenate([getattr(each, name) for each in trials]) for name in ("force", "position")
+    )
+    way, cells = float(np.ptp(position)), len(position)
+    of = ((position - position.min()) / way * (cells - 1)).astype(int)
+    force = force - np.polynomial.Polynomial.fit(position, force, CUBIC)(position)
+    power = np.abs(np.fft.rfft(np.bincount(of, force, cells), FINER * cells))
+    often = np.fft.rfftfreq(FINER * cells, way / (cells - 1))
+    return float(often[np.argmax(power * (often > RIPPLE_PERIODS / way))])
 
 
 def drafted_effect(law: ResidualLaw, rig: Rig) -> str:

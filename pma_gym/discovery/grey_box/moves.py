@@ -8,11 +8,13 @@ from numpy.typing import NDArray
 
 from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
 from pma_gym.discovery.grey_box.hypothesis import Hypothesis, Move, added_paths
+from pma_gym.discovery.grey_box.latent_law import line_over_position
 from pma_gym.discovery.grey_box.prepared_trials import PreparedTrials
-from pma_gym.discovery.grey_box.slots import gains_of_drive, values_of
+from pma_gym.discovery.grey_box.slots import gains_of_drive, quantity_of, slot, values_of
 from pma_gym.discovery.grey_box.thresholds import LEAST_TRIALS, ODD, TRIED
 from pma_gym.estimation.innovations import TREND, TRIAL
 from pma_gym.estimation.likelihood_fit import STEP, Coordinate, with_tied, with_values
+from pma_gym.estimation.smoother import smoothed
 
 Array = NDArray[np.float64]
 
@@ -101,6 +103,8 @@ class Screening:
             self.tell("screening effects", number, len(self.candidates))
             if candidate.name in added:
                 continue
+            if candidate.lowest:
+                candidate = _with_line(candidate, now)
             box = self.trials.box(candidate.beside(now.box.model), steps=now.box.rows[0].steps)
             whole = replace(now.fit.point, numbers={**box.numbers(), **now.fit.point.numbers})
             probes = self.trials.white(
@@ -122,6 +126,25 @@ class Screening:
                     )
             moves += [best] if best.candidate else []
         return moves
+
+
+def _with_line(candidate: CandidateEffect, now: Hypothesis) -> CandidateEffect:
+    """A candidate that is periodic over the position, probed at the latent force's line too."""
+    (path,) = candidate.lowest
+    line = line_over_position(
+        [smoothed(now.box, now.fit.point, i) for i in range(len(now.box.rows))]
+    )
+    # One size each: a screening is in proportion to it. The first two are a quarter period apart.
+    _, kept = np.unique(candidate.probes[:, ~candidate.amplitudes], axis=0, return_index=True)
+    candidate = replace(candidate, probes=candidate.probes[kept], signs=candidate.signs[kept])
+    probes, signs = candidate.probes[:2].copy(), candidate.signs[:2]
+    probes[:, candidate.paths.index(path)] = quantity_of(slot(path)).from_si(line)
+    probes = np.clip(probes, *candidate.bounds)
+    return replace(
+        candidate,
+        probes=np.concatenate([candidate.probes, probes]),
+        signs=np.concatenate([candidate.signs, signs]),
+    )
 
 
 def _by_trial(

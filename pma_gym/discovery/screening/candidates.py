@@ -153,7 +153,7 @@ def _within_way(candidate: CandidateEffect, sizes: Sizes) -> CandidateEffect:
     lowest = {
         path: sizes.least_periods(quantity)
         for path in candidate.paths
-        if (quantity := law.quantities[stems[path.partition(".")[2]]]).unit == PERIODIC
+        if (quantity := law.quantities[stems[path.partition(".")[2]]]).unit in PERIODIC
     }
     if not lowest:
         return candidate

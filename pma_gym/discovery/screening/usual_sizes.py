@@ -33,12 +33,13 @@ LARGE = 0.9
 LEAST_ROWS = 8
 """Fewest readings of a trial that say how far it goes."""
 
-PERIODIC = "1/m"
-"""Unit of how often a force repeats over the position."""
+PERIODIC = "1/m", "1/turn"
+"""Units of how often a force repeats over the position."""
 
 DIMENSIONS: dict[str, tuple[int, int, int, int]] = {
     "N": (1, 0, 0, 0),
     "N m": (1, 0, 0, 0),
+    "N or N m": (1, 0, 0, 0),
     "N s/mm": (1, -1, 0, 0),
     "N m s": (1, -1, 0, 0),
     "N s^2/mm^2": (1, -2, 0, 0),
@@ -50,7 +51,7 @@ DIMENSIONS: dict[str, tuple[int, int, int, int]] = {
     "N/kPa": (1, 0, 0, -1),
     "mm/s": (0, 1, 0, 0),
     "deg/s": (0, 1, 0, 0),
-    PERIODIC: (0, 0, -1, 0),
+    **dict.fromkeys(PERIODIC, (0, 0, -1, 0)),
     "%/mm": (0, 0, -1, 0),
     "%/deg": (0, 0, -1, 0),
 }

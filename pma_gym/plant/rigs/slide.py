@@ -15,12 +15,12 @@ from pma_gym.plant.rigs.rig import Rig
 from pma_gym.plant.rigs.station import TURNING_M
 
 _PLACE = (
-    "the zero of a slide's position is free in every trial, so a law of the place has none; "
+    "the zero of a slide's position is free in every trial, so a spring has none; "
     "take plant = 'joint'"
 )
 
 REFUSED_EFFECTS: dict[str, str] = {
-    **dict.fromkeys(("spring", "hardening_spring", "cogging"), _PLACE),
+    **dict.fromkeys(("spring", "hardening_spring"), _PLACE),
     "hand_push": "nobody settles a slide that nothing holds; take plant = 'station'",
     "residual_force_of_pressure": "it has no pressure; take plant = 'station'",
 }
@@ -53,7 +53,8 @@ def write_equations(equations: PlantEquations) -> None:
     eq.let("load_arriving", eq.passed("drive_lag", "load_command"))
     eq.let("position", eq["contraction"])
     # What pulls the slide out counts as backwards.
-    eq.let("drive_force", -eq["load_arriving"])
+    eq.let("load", -eq["load_arriving"])
+    eq.let("drive_force", eq.chain("two_way_shape", "load", eq["load"]))
     eq.let("drive_force", eq["drive_force"] + eq.total("drive_gain"))
     eq.let("carried_force", eq.total("contact_force"))
     eq.let("friction_factor", eq.product("dry_friction"))

@@ -5,7 +5,7 @@ import subprocess
 import sys
 from dataclasses import replace
 from functools import cache
-from math import exp
+from math import cos, exp, radians
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +17,11 @@ from pma_gym import Plant
 from pma_gym.data.datasets.dataset import read_dataset
 from pma_gym.data.trial import Trial
 from pma_gym.discovery import diagnose
-from pma_gym.discovery.grey_box.latent_law import latent_law, latent_line
+from pma_gym.discovery.grey_box.latent_law import (
+    latent_law,
+    latent_line,
+    line_over_position,
+)
 from pma_gym.effects import CATALOGUE
 from pma_gym.effects.user_effects import load_effects
 from pma_gym.estimation.innovations import Point
@@ -36,12 +40,20 @@ RIGS = {
 
 
 def logs(
-    plant, seconds=4.0, begin=0.0, friction=(1.0, 1.0, 1.0), gain=(1.0, 1.0, 1.0), seed=1, bump=0.0
+    plant,
+    seconds=4.0,
+    begin=0.0,
+    friction=(1.0, 1.0, 1.0),
+    gain=(1.0, 1.0, 1.0),
+    seed=1,
+    bump=0.0,
+    drive=lambda force, position: force,
 ):
     """Three trials of a rig that a controller moves along sums of sines, from a time on.
 
     Friction and gain of each trial are in shares of the rig's own. Friction is an impulse that at
-    most stops the rig. A bump of force lies about 0.2 m or rad.
+    most stops the rig. A bump of force lies about 0.2 m or rad. `drive` is what a drive makes of a
+    command at a position.
     """
     inertia, damping, dry, (stiffness, rate_gain), size, noise, command, reading = RIGS[plant]
     generator, trials, step = np.random.default_rng(seed), [], 1.0 / RATE_HZ / SUBSTEPS
@@ -66,7 +78,7 @@ def logs(
             for _ in range(SUBSTEPS):
                 former = speed
                 hill = bump * exp(-50.0 * (position - 0.2) ** 2)
-                speed += kick * (gain[k] * force - damping * speed + hill)
+                speed += kick * (gain[k] * drive(force, position) - damping * speed + hill)
                 speed -= min(max(speed, -most), most)
                 position += 0.5 * step * (former + speed)
         cut = slice(round(begin * RATE_HZ), None)
@@ -354,6 +366,32 @@ def test_the_proposed_trial_tells_a_weight_from_a_spring_that_small_swings_do_no
     assert decided.parameters["moment_n_m"].value == pytest.approx(0.4, rel=0.01)
 
 
+HIDDEN = {
+    "drive_dead_band": (
+        lambda size: lambda force, x: force - min(max(force, -size), size),
+        {"slide": {"width_n_or_n_m": 3.0}},
+    ),
+    "joint_cogging": (
+        lambda size, often, phase: lambda force, x: force + size * cos(often * x + radians(phase)),
+        {"joint": {"amplitude_n_m": 0.08, "periods_per_turn": 12.0, "phase_deg": 40.0}},
+    ),
+}
+"""What a drive hides: its law by its sizes, and these by rig."""
+
+
+@pytest.mark.campaign
+@pytest.mark.parametrize(
+    ("name", "plant"), [(name, plant) for name in HIDDEN for plant in HIDDEN[name][1]]
+)
+def test_what_a_drive_does_is_named_with_its_size(plant, name):
+    law, truth = HIDDEN[name][0], HIDDEN[name][1][plant]
+    diagnosis = diagnosed(plant, NEAR[plant], drive=law(*truth.values()))
+    assert [each.name for each in diagnosis.effects] == [name], diagnosis.sentence
+    for path, value in truth.items():
+        size = diagnosis.effects[0].parameters[path]
+        assert size.low <= value <= size.high, (path, size)
+
+
 @pytest.mark.campaign
 def test_where_no_trial_within_the_commands_of_the_logs_decides_that_is_said():
     diagnosis = diagnose(*swings((0.8, 1.4, 2.0), 0.003, 0.1))
@@ -394,3 +432,12 @@ def test_a_latent_force_goes_with_a_place_or_oscillates_or_does_neither(force, g
     law = latent_law(trials, model("joint").rig, 10.0)
     assert (law and law.variable) == goes_with
     assert law or latent_line(trials) == (hertz and pytest.approx((hertz, 1.0), abs=0.1))
+
+
+@pytest.mark.parametrize("often", [2.0, 7.3, 40.0])
+def test_a_force_over_the_position_has_its_period_whatever_goes_with_the_place(often):
+    t = np.arange(2000) / RATE_HZ
+    x = 0.7 * np.sin(6.283 * 0.4 * t) + 0.3 * np.sin(6.283 * t)
+    force = 5.0 * np.sin(1.5 * x) + np.cos(6.283 * often * x + 0.3)
+    trial = Smoothed(t, force, 0.0 * t, x, 0.0 * t, 0.0 * t)
+    assert line_over_position([trial]) == pytest.approx(often, abs=0.25 / np.ptp(x))
