@@ -50,6 +50,8 @@ DIMENSIONS: dict[str, tuple[int, int, int, int]] = {
     "mm/s": (0, 1, 0, 0),
     "deg/s": (0, 1, 0, 0),
     PERIODIC: (0, 0, -1, 0),
+    "%/mm": (0, 0, -1, 0),
+    "%/deg": (0, 0, -1, 0),
 }
 """Powers of force, speed, way and pressure in a unit, for those that scale with them."""
 
@@ -61,6 +63,9 @@ RESTS = (0.0, 1.0, -1.0, 4.0, -4.0)
 
 RIPPLE = 4.0
 """Periods of a force that is periodic in the position, over half of the trials' longest way."""
+
+BEND = 0.02
+"""Error of a bent sensor at half of the trials' longest way, over that."""
 
 LEAST_PERIODS = 1.25
 """Least number of its periods over the longest way: a bump at an end of the way is part of a wave,
@@ -104,7 +109,8 @@ class Sizes:
         if powers is None or quantity.usual is None or (powers[-1] and not self.pressure):
             return quantity
         force, speed, way, pressure = powers
-        share = FORCE_SHARE if force else SPEED_SHARE if speed else RIPPLE
+        way_share = RIPPLE if quantity.unit == PERIODIC else BEND
+        share = FORCE_SHARE if force else SPEED_SHARE if speed else way_share
         size = self.force**force * self.speed**speed * self.way**way
         usual = quantity.from_si(share * size * (self.pressure**pressure if pressure else 1.0))
         least = max(quantity.lower, 0.0)
