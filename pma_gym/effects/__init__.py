@@ -84,6 +84,7 @@ from pma_gym.effects.residual_law import (
     RESIDUAL_LOAD,
 )
 from pma_gym.effects.rig_ports import SECOND_PORTS
+from pma_gym.effects.sensors.bent_sensor import BENT_SENSORS
 from pma_gym.effects.sensors.potentiometer_backlash import POTENTIOMETER_BACKLASH
 from pma_gym.effects.sensors.sensor_delay import SENSOR_DELAYS
 from pma_gym.effects.sensors.sensor_errors import (
@@ -197,6 +198,7 @@ CATALOGUE: dict[str, Effect] = {
         FORCE_SENSOR,
         FORCE_SENSOR_ERROR,
         *SENSOR_DELAYS,
+        *BENT_SENSORS,
         *STOP_OPERATORS,
         PULLEY,
         LEVER,

@@ -133,8 +133,9 @@ STATION_PORTS: dict[str, Port] = {
 }
 """Ports of a station: for each the number of effects, the use of their results, and its signals."""
 
-SENSOR, SENSOR_DELAY = "sensor:", "sensor_delay:"
-"""Prefixes, before an output's name, of the ports of a sensor's errors and lag and of its delay."""
+SENSOR, SENSOR_DELAY, MOUNT = "sensor:", "sensor_delay:", "mount:"
+"""Prefixes, before an output's name, of the ports of a sensor's errors and lag, of its delay, and
+of what lies between the output and its sensor, whose model may lack a lag."""
 
 
 def example(signal: str) -> float:
@@ -148,5 +149,5 @@ def measured_output(port: str) -> str:
     >>> measured_output("sensor_delay:angle"), measured_output("drive_delay")
     ('angle', '')
     """
-    prefixes = (each for each in (SENSOR, SENSOR_DELAY) if port.startswith(each))
+    prefixes = (each for each in (SENSOR, SENSOR_DELAY, MOUNT) if port.startswith(each))
     return port.removeprefix(next(prefixes, port))

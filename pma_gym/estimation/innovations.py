@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from pma_gym.codegen.machine.control import Module
 from pma_gym.codegen.machine.native import compiled, simd_lanes
 from pma_gym.effects.effect import Effect
-from pma_gym.effects.ports import SENSOR_DELAY
+from pma_gym.effects.ports import MOUNT, SENSOR_DELAY
 from pma_gym.effects.slide.coulomb_friction import friction_path
 from pma_gym.estimation.logged import Logged
 from pma_gym.estimation.turns import turning
@@ -23,6 +23,7 @@ from pma_gym.integrator.filter_kernel import FilterEquations, parameter_slots, w
 from pma_gym.plant.composition import PlantEquations
 from pma_gym.plant.model import Model
 from pma_gym.plant.program import parameter_names, structure
+from pma_gym.plant.sensors import mount_error
 from pma_gym.units import Quantity
 
 Array = NDArray[np.float64]
@@ -90,9 +91,7 @@ def equations(model: Model, channels: Sequence[int]) -> FilterEquations:
     )
     model.rig.write_equations(eq)
     eq.finish()
-    known = {state.name: state.value for state in eq.states}
-    signals = [model.rig.signals[channel] for channel in channels]
-    readings = [known.get(f"lag_{signal.sensor}", eq.outputs[signal.name]) for signal in signals]
+    readings = [eq.readings[model.rig.signals[channel].name] for channel in channels]
     bristles = [
         n
         for e in model.effects.values()
@@ -436,7 +435,7 @@ class GreyBox:
         ]
         # A late reading in motion is not where the rig is, and its ladder is not at rest.
         way = abs(motion) * sum(point.numbers[f"{name}.delay"] for name in late)
-        level = float(np.hypot(level, way))
+        level = float(np.hypot(np.hypot(level, way), self._mounted(point, position, first)))
         at = {
             position: (first, level),
             SPEEDS[plant]: (motion, spread),
@@ -465,6 +464,16 @@ class GreyBox:
         return np.concatenate(
             [[mean for mean, _ in pairs], covariance[np.tril_indices(len(states))]]
         )
+
+    def _mounted(self, point: Point, position: str, first: float) -> float:
+        """What the mount of the position's sensor may add to a first reading."""
+        mounts = [e for e in self.model.effects.values() if e.port == f"{MOUNT}{position}"]
+        parameters = {
+            e.name: e.parameters(*(point.numbers[f"{e.name}.{stem}"] for stem in e.quantities))
+            for e in mounts
+        }
+        memories = {name: BRISTLE for e in mounts for name in e.memory_names}
+        return float(mount_error(self.model, parameters, position, first, memories))
 
     def asked(self, command: float) -> float:
         """What the drive asks for at a command (N; else the command itself)."""

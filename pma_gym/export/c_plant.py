@@ -184,12 +184,9 @@ class CPlant:
     def _read(self) -> dict[str, Value]:
         """Readings by their place: sensors' lags or, without one, true values; true values."""
         eq = self._eq
-        truth = substitute(list(eq.outputs.values()), step_start_values(eq))
-        lags = [
-            eq[self.plant.states[column]] if column >= 0 else true
-            for column, true in zip(self.plant.sensor_columns, truth, strict=True)
-        ]
-        return {f"reading[{i}]": value for i, value in enumerate([*lags, *truth])}
+        both = [*(eq.readings[name] for name in eq.outputs), *eq.outputs.values()]
+        values = substitute(both, step_start_values(eq))
+        return {f"reading[{i}]": value for i, value in enumerate(values)}
 
     def _enumerators(self, kind: str) -> Iterator[str]:
         for each in getattr(self, kind):

@@ -14,7 +14,7 @@ from pma_gym.codegen.trace import trace
 from pma_gym.effects import Effect
 from pma_gym.effects.arithmetic import positive
 from pma_gym.effects.effect import Parameters, signals
-from pma_gym.effects.ports import SENSOR_DELAY
+from pma_gym.effects.ports import MOUNT, SENSOR_DELAY
 from pma_gym.integrator.equations import Breakpoint, Equations, Interpolation, RateIndependentState
 
 LAG_SHARE = 5.0
@@ -35,6 +35,7 @@ class PlantEquations(Equations):
         views: values that laws read under the name of a signal in place of it, keyed by the port of
             their effects: those of the muscle that has the port. With `travel`, `direction` and
             `arm` (per travel of the rig) a memory counts the muscle's way.
+        readings: what sensors read besides their noise, by the output's name.
     """
 
     def __init__(
@@ -47,6 +48,7 @@ class PlantEquations(Equations):
         super().__init__(parameters, interpolation, graph)
         self.effects = dict(effects)
         self.views: dict[str, dict[str, Value]] = {}
+        self.readings: dict[str, Value] = {}
 
     def at(self, port: str) -> list[Effect]:
         """The model's effects at a port, in catalogue order."""
@@ -195,13 +197,14 @@ class PlantEquations(Equations):
     def add_sensors(self, scales: Mapping[str, float]) -> None:
         """Add the lag of every sensor, with the error scales of their outputs.
 
-        A lag's input is the output plus the errors at the same port, late by the sensor's delay;
-        their states are added too.
+        What its mount makes of the output is read. A lag's input is that plus the errors at the
+        sensor's port, late by the sensor's delay; their states are added too.
         """
+        self.readings = {output: self._mounted(output) for output in self.outputs}
         for effect in self.effects.values():
             if effect.port.startswith("sensor:") and effect.rate and not effect.law:
                 output = effect.port.removeprefix("sensor:")
-                truth = self.outputs[output]
+                truth = self.readings[output]
                 errors = [
                     self.call(error, error.law, signal=truth)
                     for error in self.at(effect.port)
@@ -211,9 +214,16 @@ class PlantEquations(Equations):
                 received = self._delayed(output, sum(errors, truth), scale)
                 rate = self.call(effect, effect.rate, signal=received)
                 self.add_decaying(f"lag_{effect.name}", rate, scale)
+                self.readings[output] = self[f"lag_{effect.name}"]
                 for error in self.at(effect.port):
                     if error.law and error.rate:
                         self._add_memory(error, error.rate, error.memory_scale)
+
+    def _mounted(self, output: str) -> Value:
+        """Return an output with what its sensor's mount adds to it."""
+        truth = self.outputs[output]
+        mounts = [each for each in self.at(f"{MOUNT}{output}") if each.law]
+        return sum((self.call(each, each.law, signal=truth) for each in mounts), truth)
 
     def _delayed(self, output: str, signal: Value, scale: float) -> Value:
         """Return an output after the delay of its sensor, whose states are added."""

@@ -1,6 +1,6 @@
 """Measurements of the DAQ: lagged signals plus noise, through the calibrations, quantised."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -12,6 +12,8 @@ from pma_gym.data.trial import Trial
 from pma_gym.data.trial_columns import BY_QUANTITY, VOLTAGE_RANGE, SampleError, TrialError
 from pma_gym.effects.contact.imposed_motion import following_rate
 from pma_gym.effects.effect import Parameters
+from pma_gym.effects.effect import signals as names_of
+from pma_gym.effects.ports import MOUNT
 from pma_gym.plant.imposed_motion import level_command, motion_command
 from pma_gym.plant.model import Model
 from pma_gym.plant.rigs.rig import TakenCommand
@@ -96,6 +98,31 @@ def reading(lagged: Any, level: Any, normal: Any, line: Calibration | None) -> A
         return noisy
     volts = noisy * line.gain + line.offset
     return (calibration.quantise(volts) - line.offset) * (1.0 / line.gain)
+
+
+def mount_error(
+    model: Model,
+    parameters: Mapping[str, Parameters],
+    output: str,
+    truth: Any,  # noqa: ANN401
+    memories: Mapping[str, Any],
+) -> Any:  # noqa: ANN401
+    """What the mount of an output's sensor adds to the true value.
+
+    Args:
+        model: the model.
+        parameters: of the effects at the mount (SI), by name.
+        output: the output's name.
+        truth: its value, a number or an array (SI).
+        memories: of the effects at the mount, by the state's name, shaped as the value.
+    """
+    total = 0.0
+    for name, effect in model.effects.items():
+        if effect.port == f"{MOUNT}{output}" and effect.law:
+            known = {"signal": truth, "p": parameters[name]}
+            known["memory"] = next((memories[each] for each in effect.memory_names), None)
+            total = total + effect.law(*(known[each] for each in names_of(effect.law)))
+    return total
 
 
 def measure(

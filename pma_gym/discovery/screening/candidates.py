@@ -20,7 +20,7 @@ from pma_gym.discovery.fitting.free_parameters import unit, values
 from pma_gym.discovery.screening.usual_sizes import PERIODIC, Sizes, sizes
 from pma_gym.effects import CATALOGUE, Effect
 from pma_gym.effects.effect import signals
-from pma_gym.effects.ports import measured_output
+from pma_gym.effects.ports import MOUNT, measured_output
 from pma_gym.plant import sensors
 from pma_gym.plant.model import Model, ModelError
 from pma_gym.units import Quantity
@@ -110,7 +110,8 @@ def _lacking(
     output = measured_output(effect.port)
     if effect.port not in model.rig.ports and not output:
         return None
-    if output and not _has_sensor(model, output):
+    mounted = model.rig.is_free and effect.port.startswith(MOUNT)
+    if output and not (output in model.rig.outputs if mounted else _has_sensor(model, output)):
         return None
     needed = model.rig.needed_ports.get(effect.port)
     if needed and all(each.port != needed for each in model.effects.values()):

@@ -61,8 +61,12 @@ RESTS = (0.0, 1.0, -1.0, 4.0, -4.0)
 """Where a spring may be relaxed, over half of the trials' longest way."""
 
 RIPPLE = 4.0
-"""Periods of a force that is periodic in the position, over half of the trials' longest way. The
-slope of a factor over the position is looked for at as much, over the same."""
+"""Periods of a force that is periodic in the position, over half of the trials' longest way."""
+
+CURVED = 0.2
+"""What changes over half of the trials' longest way, as a share: a bent sensor's reading, or the
+level of dry friction. Screening is linear in both."""
+
 
 LARGEST = 0.99
 """The same of an acceleration's peaks: the last hundredth may be readings that stand alone."""
@@ -93,7 +97,8 @@ class Sizes:
         if powers is None or quantity.usual is None or (powers[-1] and not self.pressure):
             return quantity
         force, speed, way, pressure = powers
-        share = FORCE_SHARE if force else SPEED_SHARE if speed else RIPPLE
+        way_share = RIPPLE if quantity.unit in PERIODIC else CURVED
+        share = FORCE_SHARE if force else SPEED_SHARE if speed else way_share
         size = self.force**force * self.speed**speed * self.way**way
         usual = quantity.from_si(share * size * (self.pressure**pressure if pressure else 1.0))
         least = max(quantity.lower, 0.0)

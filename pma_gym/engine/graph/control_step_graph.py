@@ -126,12 +126,8 @@ class ControlStepGraph(StepInputs):
 
     def read(self, stream: int, count: Value) -> list[Value]:
         """Measurements of the sensors (SI), with random numbers of a stream."""
-        eq, truth, signals = self.equations, self.truth(), self.state_layout.signals
-        measured = [(signal.sensor, signal.name) for signal in signals]
-        lagged = [
-            eq[f"lag_{name}"] if f"lag_{name}" in self.state_layout.states else truth[output]
-            for name, output in measured
-        ]
+        eq, signals = self.equations, self.state_layout.signals
+        lagged = substitute([eq.readings[each.name] for each in signals], step_start_values(eq))
         if not self.state_layout.options.noise:
             return lagged
         key, drawn = (self.slot("key_0"), self.slot("key_1")), []
