@@ -19,7 +19,7 @@ Odds of 20 to 1. Beyond it they are where the difference is within its own scatt
 LEFT = 0.5
 """Share of the predictions' misfit beyond noise (mean square) that named effects may leave.
 
-They carry at least half.
+And of the latent force that a difference by trial may leave: they carry at least half.
 """
 
 MOST_EFFECTS = 3
