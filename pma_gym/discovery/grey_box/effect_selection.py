@@ -15,8 +15,7 @@ from pma_gym.discovery.grey_box.prepared_trials import PreparedTrials, is_rough
 from pma_gym.discovery.grey_box.refined_fits import again, other_hold, refined, trend_instead
 from pma_gym.discovery.grey_box.slots import own_coordinates
 from pma_gym.discovery.grey_box.thresholds import LIKE, MATERIAL
-from pma_gym.discovery.thresholds import CONFIDENCE, MOST_EFFECTS
-from pma_gym.estimation.innovations import TRIAL
+from pma_gym.discovery.thresholds import CONFIDENCE, LEFT, MOST_EFFECTS
 from pma_gym.estimation.likelihood_fit import BLOCKS, value_of
 
 Array = NDArray[np.float64]
@@ -138,7 +137,7 @@ class EffectSelection:
             self.tell(step, done, self.planned)
             larger = tried(self.trials, now, move)
             self.gains.setdefault(move.name, larger.fit.value - now.fit.value)
-            chains += [[*chain, larger]] if not _at_end(larger) else []
+            chains += [[*chain, larger]] if move.candidate or is_carried(now, larger) else []
         return sorted(chains, key=self._worth, reverse=True)
 
     def _keep(self, chains: Sequence[Sequence[Hypothesis]]) -> None:
@@ -186,13 +185,17 @@ def _cost(now: Hypothesis, move: Move) -> int:
     return COST if rougher and not is_rough(now.box.model) else 1
 
 
-def _at_end(each: Hypothesis) -> bool:
-    """Whether a parameter of one trial has gone as far as it may."""
-    last = each.fit.coordinates[-1]
-    return any(
-        TRIAL in name and not last.lower * 1.01 < value_of(each.fit.point, name) < last.upper * 0.99
-        for name in each.moves[-1].slots
-    )
+def is_carried(now: Hypothesis, larger: Hypothesis) -> bool:
+    """Whether a parameter that differs by trial carries most of the latent force (mean square).
+
+    And has not gone as far as it may. The parameters of a model that lacks another thing differ
+    by trial too, surely, and leave that thing as it was.
+    """
+    last = larger.fit.coordinates[-1]
+    if not last.lower * 1.01 < value_of(larger.fit.point, last.name) < last.upper * 0.99:
+        return False
+    before, after = (float(np.sum(np.square(h.fit.point.forces))) for h in (now, larger))
+    return after < LEFT * before
 
 
 def _densities(each: Hypothesis) -> Array:
