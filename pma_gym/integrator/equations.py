@@ -111,6 +111,7 @@ class Equations:
         path_breakpoints: how far a step may travel before a rate-independent law changes form (m),
             by what holds where the step begins.
         outputs: true outputs by name.
+        readings: what sensors read of them besides noise, by the output's name.
         travelled: the state whose distance they depend on, and its rate.
         travel: its distance since the step began; None where no law depends on it.
     """
@@ -139,6 +140,7 @@ class Equations:
         self.travelled: tuple[Value, Value] | None = None
         self.travel: Value | None = None
         self.outputs: dict[str, Value] = {}
+        self.readings: dict[str, Value] = {}
 
     def finish(self) -> None:
         """Add the commands as states of constant rate, for a first-order hold."""

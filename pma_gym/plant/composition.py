@@ -35,7 +35,6 @@ class PlantEquations(Equations):
         views: values that laws read under the name of a signal in place of it, keyed by the port of
             their effects: those of the muscle that has the port. With `travel`, `direction` and
             `arm` (per travel of the rig) a memory counts the muscle's way.
-        readings: what sensors read besides their noise, by the output's name.
     """
 
     def __init__(
@@ -48,7 +47,6 @@ class PlantEquations(Equations):
         super().__init__(parameters, interpolation, graph)
         self.effects = dict(effects)
         self.views: dict[str, dict[str, Value]] = {}
-        self.readings: dict[str, Value] = {}
 
     def at(self, port: str) -> list[Effect]:
         """The model's effects at a port, in catalogue order."""
@@ -222,8 +220,12 @@ class PlantEquations(Equations):
     def _mounted(self, output: str) -> Value:
         """Return an output with what its sensor's mount adds to it."""
         truth = self.outputs[output]
-        mounts = [each for each in self.at(f"{MOUNT}{output}") if each.law]
-        return sum((self.call(each, each.law, signal=truth) for each in mounts), truth)
+        added = [
+            self.call(each, each.law, signal=truth)
+            for each in self.at(f"{MOUNT}{output}")
+            if each.law
+        ]
+        return sum(added, truth)
 
     def _delayed(self, output: str, signal: Value, scale: float) -> Value:
         """Return an output after the delay of its sensor, whose states are added."""
