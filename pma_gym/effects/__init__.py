@@ -18,6 +18,7 @@ from pma_gym.effects.contact.load_dependent_friction import (
 )
 from pma_gym.effects.contact.piston_force import PISTON_FORCE
 from pma_gym.effects.contact.quadratic_drag import JOINT_DRAG, QUADRATIC_DRAG
+from pma_gym.effects.contact.second_mass import SECOND_MASS
 from pma_gym.effects.contact.spring import (
     HARDENING_SPRING,
     JOINT_HARDENING_SPRING,
@@ -186,6 +187,7 @@ CATALOGUE: dict[str, Effect] = {
         PRESSURE_FRICTION,
         COGGING,
         BACKLASH,
+        SECOND_MASS,
         FORCE_SENSOR,
         FORCE_SENSOR_ERROR,
         *SENSOR_DELAYS,
