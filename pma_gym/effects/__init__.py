@@ -22,6 +22,7 @@ from pma_gym.effects.contact.position_friction import (
     POSITION_FRICTION,
 )
 from pma_gym.effects.contact.quadratic_drag import JOINT_DRAG, QUADRATIC_DRAG
+from pma_gym.effects.contact.second_mass import SECOND_MASS
 from pma_gym.effects.contact.spring import (
     HARDENING_SPRING,
     JOINT_HARDENING_SPRING,
@@ -195,6 +196,7 @@ CATALOGUE: dict[str, Effect] = {
         COGGING,
         JOINT_COGGING,
         BACKLASH,
+        SECOND_MASS,
         FORCE_SENSOR,
         FORCE_SENSOR_ERROR,
         *SENSOR_DELAYS,

@@ -23,6 +23,12 @@ _DRIVEN = ("velocity", "drive_force")
 _TURNING = ("position", "angle", "velocity", "spin", "drive_force")
 _CARRYING = (*_TURNING, "carried_force")
 _MOVED = ("position", "contraction", "velocity", "pressure")
+_COUPLING = Port(
+    "acceleration of the mass at the drive (m/s^2, rad/s^2)",
+    most=1,
+    signals=("acceleration",),
+    absent="acceleration",
+)
 _DELAY, _LAG = ("load_asked", "motor_voltage"), ("load_command", "motor_voltage")
 
 _SHAPE = Port(
@@ -68,6 +74,7 @@ SLIDE_PORTS: dict[str, Port] = {
         signals=(*_DRIVEN, "carried_force"),
         absent=0.0,
     ),
+    "coupling": _COUPLING,
 }
 """Ports of the slide, with the number of effects and the use of their results."""
 
@@ -100,6 +107,7 @@ JOINT_PORTS: dict[str, Port] = {
         signals=_CARRYING,
         absent=0.0,
     ),
+    "coupling": _COUPLING,
 }
 """Ports of the joint, with the number of effects and the use of their results."""
 
@@ -195,10 +203,10 @@ angle that grows as it shortens.
 RATE_SIGNALS: dict[str, tuple[str, ...]] = {
     "station": EVERYTHING,
     "slide": (
-        *(*_DRIVEN, "carried_force", "motor_voltage"),
+        *(*_DRIVEN, "acceleration", "carried_force", "motor_voltage"),
         *("load_asked", "load_command", "load_arriving"),
     ),
-    "joint": (*_CARRYING, "motor_voltage", "load_asked", "load_command"),
+    "joint": (*_CARRYING, "acceleration", "motor_voltage", "load_asked", "load_command"),
     "imposed": (*_MOVED, "pressure_asked", "pressure_command"),
     "cascade": (*_AIR, "regulator_voltage"),
     **dict.fromkeys(("muscle_joint", "muscle_pair"), (*_CARRYING, "contraction", *_AIR, *_FLOWING)),

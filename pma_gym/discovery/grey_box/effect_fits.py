@@ -59,7 +59,8 @@ def tried(trials: PreparedTrials, now: Hypothesis, move: Move, careful: bool = F
     more += [presliding(candidate.effect)] if "presliding" in law.scanned else []
     here = move.start or now.fit.point
     whole = replace(here, numbers={**box.numbers(), **here.numbers})
-    starts = _starts(trials, box, whole, at, absent, more, tied)
+    sized = [slot(p) for p, size in zip(candidate.paths, candidate.amplitudes, strict=True) if size]
+    starts = _starts(trials, box, whole, at, absent, sized, more, tied)
     coordinates = [*now.fit.coordinates, *more]
     box = trials.precise(box.model, starts[0], now.box.rows[0].steps)
     chosen = starts[FITTED:][:FURTHER] if careful else starts[:FITTED]
@@ -78,6 +79,7 @@ def _starts(
     whole: Point,
     at: Mapping[str, float],
     absent: Mapping[str, float],
+    sized: Sequence[str],
     more: Sequence[Coordinate],
     tied: Mapping[str, str],
 ) -> list[Point]:
@@ -92,11 +94,11 @@ def _starts(
             for slip in SLIPS if slips else (1.0,):
                 values = dict(at)
                 for c in more:
-                    size = absent.get(c.name, 0.0)
+                    size, share = absent.get(c.name, 0.0), part if c.name in sized else 1.0
                     values[c.name] = (
                         float(np.clip(whole.numbers[c.name] * slip, c.lower, c.upper))
                         if c in slips
-                        else size + part * (at[c.name] - size)
+                        else size + share * (at[c.name] - size)
                     )
                 start = with_values(whole, with_tied(values, tied))
                 points.append(weaker(trials, start, less))

@@ -23,7 +23,7 @@ DIRECTIONS = {"contracting": 1.0, "relaxing": -1.0}
 _STEP, _PRESSURE_STEP, _VOLTAGE_STEP = 1e-7, 100.0, 1e-4
 """Steps of the central differences: m, rad or their rates; Pa; V."""
 
-_FOLLOWING = ("drive_delay", "drive_lag", "regulator_delay", "regulator_lag")
+_FOLLOWING = ("drive_delay", "drive_lag", "regulator_delay", "regulator_lag", "coupling")
 """Ports whose effects' states are part of the linear system."""
 
 _AWAY = 1e-6

@@ -43,8 +43,10 @@ def write_equations(equations: PlantEquations) -> None:
     torque = torque + eq.total("joint_drive_loss") + eq.total("joint_torque")
     eq.outputs = {"angle": eq["angle"], "speed": eq["spin"]}
     eq.add_state("angle", eq["spin"], SCALES["angle"])
-    eq.add_state("spin", torque / eq.parameters["inertia"].inertia, SCALES["spin"])
-    eq.add_memories(tuple(JOINT_PORTS), dict.fromkeys(("drive_delay", "drive_lag"), LEAST_COMMAND))
+    eq.let("acceleration", torque / eq.parameters["inertia"].inertia)
+    eq.add_state("spin", eq.passed("coupling", "acceleration"), SCALES["spin"])
+    late = dict.fromkeys(("drive_delay", "drive_lag"), LEAST_COMMAND)
+    eq.add_memories(tuple(JOINT_PORTS), {**late, "coupling": SCALES["spin"]})
     eq.add_sensors({"angle": SCALES["angle"], "speed": SCALES["spin"]})
     eq.add_event("turning", eq["spin"], TURNING_RAD, turning=True)
     eq.add_breakpoints()

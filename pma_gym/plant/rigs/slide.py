@@ -64,7 +64,8 @@ def write_equations(equations: PlantEquations) -> None:
     pushed = eq["drive_force"] + eq.total("drive_loss")
     force = eq["slide_force"] + pushed - eq["resistance"] * eq["velocity"]
     eq.add_state("contraction", eq["velocity"], SCALES["contraction"])
-    eq.add_state("velocity", force / slide.mass, SCALES["velocity"])
+    eq.let("acceleration", force / slide.mass)
+    eq.add_state("velocity", eq.passed("coupling", "acceleration"), SCALES["velocity"])
     eq.add_memories(tuple(SLIDE_PORTS))
     eq.add_sensors(SCALES)
     eq.add_event("turning", eq["velocity"], TURNING_M, turning=True)
