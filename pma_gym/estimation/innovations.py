@@ -351,11 +351,11 @@ class GreyBox:
             some = list(points[first : first + width])
             filled = some + [some[-1]] * (width - len(some))
             trial = trials[number]
-            given = self._given(self.kernel, number, trial, filled)
+            arguments = self._arguments(self.kernel, number, trial, filled)
             delays = [point.delay for point in filled]
-            out = self._run(self.kernel, trial, delays, given)
+            out = self._run(self.kernel, trial, delays, arguments)
             if trial.finer is not None:
-                out = _extrapolated(out, self._run(self.kernel, trial.finer, delays, given))
+                out = _extrapolated(out, self._run(self.kernel, trial.finer, delays, arguments))
             for i, into in enumerate(results[number]):
                 into[first : first + width] = np.moveaxis(out[:, :, i, : len(some)], -1, 0)
 
@@ -369,7 +369,7 @@ class GreyBox:
         k = kernel(self.model, self.channels, keeps=True)
         n, s, trial = len(k.states), k.size, self.rows[number].finer or self.rows[number]
         room = np.empty((len(trial.time), 2 * s + n * n))
-        self._run(k, trial, [point.delay], self._given(k, number, trial, [point]), room)
+        self._run(k, trial, [point.delay], self._arguments(k, number, trial, [point]), room)
         lower = np.tril_indices(n)
 
         def full(flat: Array) -> Array:
@@ -387,7 +387,7 @@ class GreyBox:
             transition,
         )
 
-    def _given(
+    def _arguments(
         self, k: Kernel, number: int, trial: Rows, points: Sequence[Point]
     ) -> tuple[Array, Array]:
         """Parameters (slots, points), and means and covariances at the first row, of a trial."""
@@ -400,14 +400,14 @@ class GreyBox:
         k: Kernel,
         trial: Rows,
         delays: Sequence[float],
-        given: tuple[Array, Array],
+        arguments: tuple[Array, Array],
         kept: Array | None = None,
     ) -> Array:
         commands = np.array([trial.commands(delay) for delay in delays]).T
         out = np.empty((len(trial.time), len(self.channels), 2, len(delays)))
         arrays = [
             np.ascontiguousarray(a)
-            for a in (trial.firsts, trial.lengths, commands, trial.readings, *given)
+            for a in (trial.firsts, trial.lengths, commands, trial.readings, *arguments)
         ]
         addresses = [a.ctypes.data for a in (*arrays, out)]
         k.call(len(trial.time), *addresses, 0 if kept is None else kept.ctypes.data)

@@ -86,7 +86,7 @@ class Sizes:
         pressure: of the trials; 0 where there is none.
         strongest: force of the drive and force of inertia, the largest of each; infinite where
             the rig's one inertia is not known.
-        band: frequencies (Hz) that the trials can show: with `LEAST_PERIODS` in the longest, up to
+        band: frequencies (Hz) that the trials can show: with `RIPPLE_PERIODS` in the longest, up to
             half of the rows' rate.
     """
 
@@ -128,8 +128,8 @@ class Sizes:
     def resonances(self, quantity: Quantity) -> tuple[float, ...]:
         """Frequencies (file unit) at which a resonance is looked for."""
         low, high = np.log2(self.band)
-        found = 2.0 ** np.arange(low, high, OCTAVES)
-        return tuple(float(f) for f in np.clip(found, quantity.lower, quantity.upper))
+        frequencies = 2.0 ** np.arange(low, high, OCTAVES)
+        return tuple(float(f) for f in np.clip(frequencies, quantity.lower, quantity.upper))
 
     def within_way(self, quantity: Quantity) -> Quantity:
         """A length with its usual value, or with a small share of the trials' ways if that is less.
@@ -161,7 +161,7 @@ def sizes(model: Model, trials: Sequence[Trial]) -> Sizes | None:
     strongest += _largest_inertial(model, read)
     longest = max(float(time[-1] - time[0]) for time, _ in read)
     fastest = 0.5 / min(float(np.median(np.diff(time))) for time, _ in read)
-    return Sizes(force, speed, way, 0.0, strongest, (LEAST_PERIODS / longest, fastest))
+    return Sizes(force, speed, way, 0.0, strongest, (RIPPLE_PERIODS / longest, fastest))
 
 
 def _largest_inertial(model: Model, read: Sequence[tuple[np.ndarray, np.ndarray]]) -> float:

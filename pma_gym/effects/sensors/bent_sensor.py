@@ -26,7 +26,7 @@ class EncoderBend(NamedTuple):
     ]
 
 
-def bend(signal, p):
+def curvature_error(signal, p):
     """Error of a bent sensor.
 
         error = curvature s^2
@@ -47,7 +47,7 @@ def _bent(sensor: Effect, parameters: type) -> Effect:
         name=f"{sensor.name}_bend",
         port=sensor.port.replace("sensor:", "mount:"),
         parameters=parameters,
-        law=bend,
+        law=curvature_error,
         signature=(
             "readings are off by the square of the position, the same at every speed and force, "
             "so a fast motion's waves look higher at one end"
