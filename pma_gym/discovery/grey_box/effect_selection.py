@@ -16,6 +16,7 @@ from pma_gym.discovery.grey_box.refined_fits import again, other_hold, refined, 
 from pma_gym.discovery.grey_box.slots import own_coordinates
 from pma_gym.discovery.grey_box.thresholds import LIKE, MATERIAL
 from pma_gym.discovery.thresholds import CONFIDENCE, LEFT, MOST_EFFECTS
+from pma_gym.estimation.innovations import TREND, TRIAL
 from pma_gym.estimation.likelihood_fit import BLOCKS, value_of
 
 Array = NDArray[np.float64]
@@ -35,6 +36,11 @@ DELAYS = ("drive_delay", "lvdt_delay", "tachometer_delay", "encoder_delay", "gyr
 
 LAGS = ("lvdt_lag", "tachometer_lag", "encoder_lag", "gyroscope_lag")
 """The same where there is one signal."""
+
+
+SIMULATED = ("second_mass",)
+"""Effects that no fit tries: on a slide with nothing of it one stood in for the presliding of its
+friction (share 0.034, damping 0.28)."""
 
 
 class EffectSelection:
@@ -58,7 +64,7 @@ class EffectSelection:
         # The delay between command and readings is free in every fit; a lag of the only sensor
         # is no other thing.
         late = DELAYS[:1] if len(trials.channels) > 1 else (*DELAYS, *LAGS)
-        self.candidates = [each for each in candidates if each.name not in late]
+        self.candidates = [each for each in candidates if each.name not in (*late, *SIMULATED)]
         self.gains: dict[str, float] = {}
         self.fitted: dict[frozenset[str], Hypothesis] = {}
 
@@ -188,11 +194,16 @@ def _cost(now: Hypothesis, move: Move) -> int:
 def is_carried(now: Hypothesis, larger: Hypothesis) -> bool:
     """Whether a parameter that differs by trial carries most of the latent force (mean square).
 
-    And has not gone as far as it may. The parameters of a model that lacks another thing differ
-    by trial too, surely, and leave that thing as it was.
+    And differs by as much as matters, and has not gone as far as it may. The parameters of a model
+    that lacks another thing differ by trial too, surely, and leave that thing as it was.
     """
-    last = larger.fit.coordinates[-1]
-    if not last.lower * 1.01 < value_of(larger.fit.point, last.name) < last.upper * 0.99:
+    last, point = larger.fit.coordinates[-1], larger.fit.point
+    own, base = value_of(point, last.name), last.name.partition(TRIAL)[0].removesuffix(TREND)
+    usual = value_of(point, base)
+    differs = own * np.ptp(larger.box.order) if last.name.endswith(TREND) else own - usual
+    if abs(differs) < MATERIAL * abs(usual):
+        return False
+    if not last.lower * 1.01 < own < last.upper * 0.99:
         return False
     before, after = (float(np.sum(np.square(h.fit.point.forces))) for h in (now, larger))
     return after < LEFT * before

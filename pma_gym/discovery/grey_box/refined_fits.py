@@ -83,10 +83,12 @@ def other_hold(trials: PreparedTrials, now: Hypothesis) -> Hypothesis:
 
 
 def trend_instead(trials: PreparedTrials, now: Hypothesis) -> Hypothesis:
-    """With a trend in place of several trials that each have a parameter of their own."""
-    of = [slot_.partition(TRIAL)[0] for move in now.moves for slot_ in move.slots]
+    """With a trend in place of several values that a parameter has by trial, or beside a trend."""
+    slots = [slot_ for move in now.moves for slot_ in move.slots]
+    of = [slot_.partition(TRIAL)[0].removesuffix(TREND) for slot_ in slots]
     for base in {each for each in of if of.count(each) > 1}:
-        gone = {name for name in now.fit.point.numbers if name.startswith(f"{base}{TRIAL}")}
+        marked = f"{base}{TRIAL}", f"{base}{TREND}"
+        gone = {name for name in now.fit.point.numbers if name.startswith(marked)}
         gone |= {slot_ for slot_, name in now.fit.tied.items() if name in gone}
         numbers = {n: v for n, v in now.fit.point.numbers.items() if n not in gone}
         less = replace(

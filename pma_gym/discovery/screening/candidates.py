@@ -184,9 +184,7 @@ def _places(stem: str, quantity: Quantity, sizes: Sizes | None) -> tuple[float, 
     """Where (file unit) an effect with a place of its own is looked for; none without one."""
     if stem == "offset" and quantity.turns:
         return QUARTERS
-    if sizes is not None and stem in ("rest", "frequency"):
-        return sizes.rests(quantity) if stem == "rest" else sizes.resonances(quantity)
-    return ()
+    return sizes.rests(quantity) if stem == "rest" and sizes is not None else ()
 
 
 def _sized(effect: Effect, stem: str, quantity: Quantity, sizes: Sizes) -> Quantity:

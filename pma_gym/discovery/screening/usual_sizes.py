@@ -67,10 +67,6 @@ CURVED = 0.2
 """What changes over half of the trials' longest way, as a share: a bent sensor's reading, or the
 level of dry friction. Screening is linear in both."""
 
-OCTAVES = 0.5
-"""Between frequencies at which a resonance is looked for: none is further than a quarter octave
-from one. From that far off, 10.05 Hz, fits of a slide and a joint with 12 Hz ended at 12.0 Hz."""
-
 LARGEST = 0.99
 """The same of an acceleration's peaks: the last hundredth may be readings that stand alone."""
 
@@ -86,8 +82,6 @@ class Sizes:
         pressure: of the trials; 0 where there is none.
         strongest: force of the drive and force of inertia, the largest of each; infinite where
             the rig's one inertia is not known.
-        band: frequencies (Hz) that the trials can show: with `RIPPLE_PERIODS` in the longest, up to
-            half of the rows' rate.
     """
 
     force: float
@@ -95,7 +89,6 @@ class Sizes:
     way: float
     pressure: float = 0.0
     strongest: float = np.inf
-    band: tuple[float, float] = (1.0, 1.0)
 
     def scaled(self, quantity: Quantity) -> Quantity:
         """A quantity with the usual value that the sizes make of it, within its bounds."""
@@ -125,12 +118,6 @@ class Sizes:
         way = quantity.from_si(self.way)
         return tuple(float(np.clip(each * way, quantity.lower, quantity.upper)) for each in RESTS)
 
-    def resonances(self, quantity: Quantity) -> tuple[float, ...]:
-        """Frequencies (file unit) at which a resonance is looked for."""
-        low, high = np.log2(self.band)
-        frequencies = 2.0 ** np.arange(low, high, OCTAVES)
-        return tuple(float(f) for f in np.clip(frequencies, quantity.lower, quantity.upper))
-
     def within_way(self, quantity: Quantity) -> Quantity:
         """A length with its usual value, or with a small share of the trials' ways if that is less.
 
@@ -158,10 +145,7 @@ def sizes(model: Model, trials: Sequence[Trial]) -> Sizes | None:
     if not min(force, speed, way) > 0.0:
         return None
     strongest = max(float(np.abs(each).max()) for each in forces)
-    strongest += _largest_inertial(model, read)
-    longest = max(float(time[-1] - time[0]) for time, _ in read)
-    fastest = 0.5 / min(float(np.median(np.diff(time))) for time, _ in read)
-    return Sizes(force, speed, way, 0.0, strongest, (RIPPLE_PERIODS / longest, fastest))
+    return Sizes(force, speed, way, strongest=strongest + _largest_inertial(model, read))
 
 
 def _largest_inertial(model: Model, read: Sequence[tuple[np.ndarray, np.ndarray]]) -> float:

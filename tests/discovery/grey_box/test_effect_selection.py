@@ -1,4 +1,4 @@
-"""Which parameters may differ by trial: those that carry the latent force."""
+"""Which parameters may differ by trial: those that carry the latent force, by what matters."""
 
 from types import SimpleNamespace
 
@@ -14,10 +14,10 @@ from pma_gym.estimation.likelihood_fit import BLOCKS, Coordinate, Fit
 def fitted(forces, coordinate=None, value=0.0):
     """A hypothesis whose trials have latent forces (N), with a number of one trial free."""
     coordinates = (coordinate,) if coordinate else ()
-    numbers, free = {each.name: value for each in coordinates}, len(coordinates)
-    point = Point(numbers, (1e-5,), forces, 0.1)
+    own, free = {each.name: value for each in coordinates}, len(coordinates)
+    point = Point({"slide.mass": 5.0, "two_way_drive.gain": 1.0, **own}, (1e-5,), forces, 0.1)
     fit = Fit(point, 0.0, coordinates, {}, np.eye(free), np.zeros((BLOCKS, free)))
-    return Hypothesis(SimpleNamespace(rows=[]), fit)
+    return Hypothesis(SimpleNamespace(rows=[], order=np.array([-1.0, 0.0, 1.0])), fit)
 
 
 ALONE = Coordinate(f"slide.mass{TRIAL}1", 1.0, False, 1.0, 25.0)
@@ -31,7 +31,11 @@ DRIFT = Coordinate(f"two_way_drive.gain{TREND}", 1.0)
         (ALONE, 25.0, (0.2, 0.2, 0.2), False),
         # Beside what every trial lacks, one trial's own mass is more likely, and stands in for it.
         (ALONE, 8.0, (0.2, 0.2, 3.9), False),
+        # A fiftieth of the mass is what a data sheet is off by.
+        (ALONE, 5.09, (0.2, 0.2, 0.2), False),
+        (ALONE, 5.11, (0.2, 0.2, 0.2), True),
         (DRIFT, -0.02, (0.2, 0.2, 0.2), True),
+        (DRIFT, -0.009, (0.2, 0.2, 0.2), False),
         (DRIFT, -0.02, (1.9, 0.2, 3.9), False),
     ],
 )
