@@ -12,10 +12,17 @@ from pma_gym.discovery.grey_box.first_fit import first_fit, unmoved
 from pma_gym.discovery.grey_box.hypothesis import Hypothesis, Move
 from pma_gym.discovery.grey_box.moves import Screening
 from pma_gym.discovery.grey_box.prepared_trials import PreparedTrials, is_rough
-from pma_gym.discovery.grey_box.refined_fits import again, other_hold, refined, trend_instead
+from pma_gym.discovery.grey_box.refined_fits import (
+    again,
+    finest,
+    other_hold,
+    refined,
+    trend_instead,
+)
 from pma_gym.discovery.grey_box.slots import own_coordinates
 from pma_gym.discovery.grey_box.thresholds import LIKE, MATERIAL
 from pma_gym.discovery.thresholds import CONFIDENCE, LEFT, MOST_EFFECTS
+from pma_gym.effects import CATALOGUE
 from pma_gym.estimation.innovations import TREND, TRIAL
 from pma_gym.estimation.likelihood_fit import BLOCKS, value_of
 
@@ -67,6 +74,7 @@ class EffectSelection:
         self.candidates = [each for each in candidates if each.name not in (*late, *SIMULATED)]
         self.gains: dict[str, float] = {}
         self.fitted: dict[frozenset[str], Hypothesis] = {}
+        self._fine: dict[int, tuple[Hypothesis, Hypothesis]] = {}
 
     def run(self) -> list[Hypothesis]:
         """From the model as it came to the last hypothesis that is worth its price.
@@ -107,7 +115,7 @@ class EffectSelection:
             near = [
                 other[-1]
                 for other in chains[1:]
-                if other[:-1] == chains[0][:-1] and self._is_rival(other, chain)
+                if other[:-1] == chains[0][:-1] and not self._is_ahead(last, other[-1])
             ]
             alike = {each.moves[-1].name: each for each in reversed(near)}
             names = tuple(dict.fromkeys(each.moves[-1].name for each in near))
@@ -143,7 +151,8 @@ class EffectSelection:
             self.tell(step, done, self.planned)
             larger = tried(self.trials, now, move)
             self.gains.setdefault(move.name, larger.fit.value - now.fit.value)
-            chains += [[*chain, larger]] if move.candidate or is_carried(now, larger) else []
+            fits = _ends_within(larger) if move.candidate else is_carried(now, larger)
+            chains += [[*chain, larger]] if fits else []
         return sorted(chains, key=self._worth, reverse=True)
 
     def _keep(self, chains: Sequence[Sequence[Hypothesis]]) -> None:
@@ -169,26 +178,55 @@ class EffectSelection:
     def _lead(self, chain: Sequence[Hypothesis], other: Sequence[Hypothesis]) -> float:
         return self._worth(chain) - self._worth(other)
 
-    def _is_rival(self, other: Sequence[Hypothesis], best: Sequence[Hypothesis]) -> bool:
-        """Whether other readings of the same rigs might well be likelier by another chain.
+    def _is_ahead(self, one: Hypothesis, other: Hypothesis) -> bool:
+        """Whether a hypothesis would be likelier than another by other readings of the rigs, too.
 
-        The lead is within its own scatter over blocks of readings: where no model is quite right,
-        a lead of many units may be chance (Q. H. Vuong 1989, "Likelihood ratio tests for model
-        selection and non-nested hypotheses", Econometrica 57).
+        Not where the lead is within its own scatter over blocks of readings: where no model is
+        quite right, a lead of many units may be chance (Q. H. Vuong 1989, "Likelihood ratio tests
+        for model selection and non-nested hypotheses", Econometrica 57).
         """
-        lead = self._lead(best, other)
+        lead = one.fit.value - other.fit.value - self.price(one, other)
         if lead < LIKE:
-            return True
-        differ = _densities(best[-1]) - _densities(other[-1])
+            return False
+        differ = _densities(one) - _densities(other)
         edges = np.linspace(0, len(differ), BLOCKS + 1).astype(int)[:-1]
         scatter = BLOCKS**0.5 * float(np.std(np.add.reduceat(differ, edges)))
-        return lead < CONFIDENCE * scatter
+        return lead >= CONFIDENCE * scatter
+
+    def finest(self, each: Hypothesis) -> Hypothesis:
+        """A hypothesis with dry friction, fitted once more with fine steps."""
+        if id(each) not in self._fine:
+            self._fine[id(each)] = each, finest(self.trials, each)
+        return self._fine[id(each)][1]
+
+    def confirmed(self, path: Sequence[Hypothesis]) -> list[Hypothesis]:
+        """Hypotheses without the last that make up for coarse steps where friction turns alone."""
+        kept = list(path)
+        while len(kept) > 1 and is_rough(kept[-2].box.model):
+            if self._is_ahead(*map(self.finest, (kept[-1], kept[-2]))):
+                break
+            kept.pop()
+        return kept
 
 
 def _cost(now: Hypothesis, move: Move) -> int:
     """How long a move's fits take, in those of one that needs no shorter steps."""
     rougher = move.candidate and is_rough(move.candidate.beside(now.box.model))
     return COST if rougher and not is_rough(now.box.model) else 1
+
+
+def _ends_within(larger: Hypothesis) -> bool:
+    """Whether no number of the effect that was added last has gone as far as it may.
+
+    A ripple whose period is as long as the way is none. Friction's shape may be at its end.
+    """
+    candidate = larger.moves[-1].candidate
+    assert candidate is not None
+    if CATALOGUE[candidate.effect].rate_independent_law:
+        return True
+    own = [c for c in larger.fit.coordinates if c.name.startswith(f"{candidate.effect}.")]
+    values = [value_of(larger.fit.point, c.name) for c in own]
+    return not any(value in (c.lower, c.upper) for value, c in zip(values, own, strict=True))
 
 
 def is_carried(now: Hypothesis, larger: Hypothesis) -> bool:

@@ -14,7 +14,6 @@ from pma_gym.discovery.grey_box.hypothesis import Hypothesis, Move
 from pma_gym.discovery.grey_box.kept_fits import fit
 from pma_gym.discovery.grey_box.predictions import Predictions
 from pma_gym.discovery.grey_box.prepared_trials import LEAST_FORCE
-from pma_gym.discovery.grey_box.refined_fits import finest
 from pma_gym.discovery.grey_box.slots import gains_of_drive, quantity_of, slot
 from pma_gym.discovery.grey_box.thresholds import FAR, LIKE, NOISES, SMALL
 from pma_gym.discovery.result.misfit import rms
@@ -41,7 +40,7 @@ class Proposal:
     @cached_property
     def last(self) -> Hypothesis:
         """The hypothesis that is proposed, without a delay that is not worth its price."""
-        chosen = finest(self.selection.trials, self._chosen)
+        chosen = self.selection.finest(self._chosen)
         prompt = [c for c in chosen.fit.coordinates if c.name != "delay"]
         made = fit(chosen.box, replace(chosen.fit.point, delay=0.0), prompt, chosen.fit.tied)
         least = chosen.fit.value - chosen.price_of(1) - LIKE
