@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from pma_gym.estimation.innovations import GreyBox, Point, log_likelihood
+from pma_gym.estimation.innovations import TURNS, GreyBox, Point, log_likelihood
 
 Array = NDArray[np.float64]
 
@@ -140,10 +140,15 @@ class Fit:
         }
 
     def moved_from(self, coarser: "Fit") -> "Fit":
-        """With what parts it from a fit of the same by coarser integration as an error."""
+        """With what its integration may still be off by as an error.
+
+        By a fit of the same whose steps are `TURNS` times as long where the motion turns: a turn
+        within a step is of order 1.
+        """
         known = {c.name for c in coarser.coordinates}
         points = [(c, coarser.point if c.name in known else self.point) for c in self.coordinates]
-        return replace(self, shifts=np.array([c.of(self.point) - c.of(p) for c, p in points]))
+        apart = np.array([c.of(self.point) - c.of(p) for c, p in points])
+        return replace(self, shifts=apart / (TURNS - 1.0))
 
     def moved(self, name: str, x: float) -> Point:
         """The point with one coordinate elsewhere."""

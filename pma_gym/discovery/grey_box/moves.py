@@ -113,9 +113,11 @@ class Screening:
             )
             best = Move(candidate.name, -np.inf, 0)
             for i, row in enumerate(probes):
+                if not np.isfinite(row).all():
+                    continue
                 change = beyond(row - error)
                 square = float(change @ change)
-                if not np.isfinite(square) or square < NOTHING:
+                if square < NOTHING:
                     continue
                 amount = -float(left @ change) / square
                 if amount < 0.0 and not candidate.signs[i]:

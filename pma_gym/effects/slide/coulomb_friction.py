@@ -35,7 +35,7 @@ def friction_force(velocity, friction_factor, memory, p):
 
     Args:
         velocity: rate of contraction v (m/s).
-        friction_factor: factor k on its level, as `position_friction` has it; else 1.
+        friction_factor: factor k on its level, from the place on the stroke; else 1.
         memory: deflection z of the bristles, between -1 and 1.
         p: CoulombFriction: static, dynamic (N), stribeck_speed (m/s), presliding (m).
     Returns:

@@ -96,7 +96,7 @@ def test_the_order_of_the_page(example):
 
 def test_the_effect_comes_with_equation_size_and_rivals(page_of):
     page = page_of("effect")
-    assert "F = -f(v) z" in page and "Dry friction of the slide" in page
+    assert "F = -k f(v) z" in page and "Dry friction of the slide" in page
     for text in ("19.1 to 21.4", "below 22", "hysteresis", "p &lt; 0.001", "about 40 to 1"):
         assert text in page
 

@@ -16,10 +16,9 @@ from pma_gym.data.trial import Trial
 from pma_gym.discovery.preparation.acceptance_floors import REPEATS, TOLERANCE, AcceptanceFloor
 from pma_gym.discovery.preparation.noise import white_noise
 from pma_gym.discovery.preparation.nuisance_projection import drift_columns
+from pma_gym.discovery.thresholds import ALIKE_BESIDE, ALIKE_CHANCE
 from pma_gym.discovery.verdict.adequacy import Adequacy, SignalAdequacy
 from pma_gym.discovery.verdict.common_drift import (
-    CHANCE,
-    SURELY,
     chance_of_common_drift,
     with_common_drift,
 )
@@ -125,7 +124,8 @@ def test_an_adequate_signal_is_left_open_unless_the_lab_is_content(logged, sourc
     assert (after.undecided is None) == (fault is None) and after.structure is None
     # Beside effects it takes more to withhold a name; then it comes before whatever else is wrong.
     faint = left(logged, np.random.default_rng(9), common=0.8)
-    assert SURELY < chance_of_common_drift(logged, faint, noise(), PRESSURE) < CHANCE
+    chance = chance_of_common_drift(logged, faint, noise(), PRESSURE)
+    assert ALIKE_BESIDE < chance < ALIKE_CHANCE
     assert with_common_drift(judged, logged, faint, noises).signals[name].fault == fault
     assert with_common_drift(judged, logged, faint, noises, beside=True) == judged
     # What is wrong already stays so.

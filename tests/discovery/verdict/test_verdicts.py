@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import pytest
 
 from pma_gym.discovery.report.verdict_text import sentence
+from pma_gym.discovery.thresholds import MOST_AUTOCORRELATED, MOST_SPREAD, SLOW_LEFT
 from pma_gym.discovery.verdict import decision, unknown
 from pma_gym.discovery.verdict.adequacy import Adequacy
 from pma_gym.discovery.verdict.residual_fraction import ResidualFraction
@@ -165,8 +166,8 @@ def same_size(monkeypatch):
 @pytest.mark.parametrize(
     ("left", "why", "figure", "limit"),
     [
-        (ResidualFraction(0.4, 0.5), "slow", 0.4, unknown.MOST_LEFT),
-        (ResidualFraction(0.1, 0.5), "autocorrelated", 0.5, unknown.MOST_AUTOCORRELATED),
+        (ResidualFraction(0.4, 0.5), "slow", 0.4, SLOW_LEFT),
+        (ResidualFraction(0.1, 0.5), "autocorrelated", 0.5, MOST_AUTOCORRELATED),
     ],
 )
 def test_the_first_figure_beyond_its_limit_is_the_reason(same_size, left, why, figure, limit):
@@ -182,7 +183,7 @@ def test_a_size_that_scatters_is_named_with_where_it_scatters_most(same_size):
     both = made_up(("creep", "filling"))
     reason = unknown.why_unknown(both, ResidualFraction(0.01, 0.0), [])
     assert (reason.why, reason.of, reason.by) == ("scatters", "filling", "contraction")
-    assert (reason.figure, reason.limit) == (0.5, unknown.MOST_SPREAD)
+    assert (reason.figure, reason.limit) == (0.5, MOST_SPREAD)
     widest = [unknown.widest_scatter(each) for each in (both, made_up(("creep",)), made_up(()))]
     assert widest == [0.5, 0.12, 0.0]
 
