@@ -25,6 +25,9 @@ presliding distance.
 FITTED, FURTHER = 1, 2
 """How many of them are fitted, the likeliest as they are, and in a careful fit."""
 
+AMOUNTS = (-0.5, -0.3, 0.0, 0.3, 0.6, 1.0, 1.5, 2.0, 3.0)
+"""By how many times itself a parameter of an odd trial may differ where its fits begin."""
+
 MOST_FACTOR = 5.0
 """Factor that a parameter of one trial may differ by.
 
@@ -131,13 +134,20 @@ def _varied(trials: PreparedTrials, now: Hypothesis, move: Move, careful: bool) 
     tied_slots = [slot_ for slot_, of in now.fit.tied.items() if of == base]
     tied |= {f"{tied_slot}{mark}{number}": name for tied_slot in tied_slots}
     coordinates = [*now.fit.coordinates, Coordinate(name, scale, False, *bounds)]
-    fits = []
-    further = ((0.5, 0.1), (1.0, 0.1), (-0.3, 0.1))[: 3 if careful else 1]
-    further = further if odd and mark == TRIAL else ()
-    for amount, share in ((0.0, 0.5), *further):
-        there = float(np.clip(first + amount * abs(value), *bounds))
-        start = with_values(now.fit.point, with_tied({name: there}, tied))
-        fits += [fit(now.box, weaker(trials, start, share), coordinates, tied, rough=not careful)]
+    starts = [weaker(trials, with_values(now.fit.point, with_tied({name: first}, tied)), 0.5)]
+    if odd and mark == TRIAL:
+        # Where it differs much, the likeliest of what it may be beside a share of its latent force.
+        here = [
+            replace(
+                with_values(now.fit.point, with_tied({name: there}, tied)),
+                forces=tuple(share * force for force in now.fit.point.forces),
+            )
+            for there in np.clip(value + np.array(AMOUNTS) * abs(value), *bounds).tolist()
+            for share in (1.0, *LESS)
+        ]
+        likely = log_likelihood(now.box.innovations(here), now.box.rows)
+        starts += [here[i] for i in np.argsort(-likely)[: 1 + careful]]
+    fits = [fit(now.box, start, coordinates, tied, rough=not careful) for start in starts]
     best = max(fits, key=lambda made: made.value)
     return Hypothesis(now.box, best, (*now.moves, move), now.rivals)
 
