@@ -14,8 +14,6 @@ from functools import cache
 SI_FACTORS: dict[str, float] = {
     "1": 1.0,
     "%": 0.01,
-    "%/mm": 10.0,
-    "%/deg": 1.8 / math.pi,
     "V": 1.0,
     "s": 1.0,
     "ms": 1e-3,
@@ -42,6 +40,8 @@ SI_FACTORS: dict[str, float] = {
     "bar": 1e5,
     "1/kPa": 1e-3,
     "1/mm": 1e3,
+    "%/mm": 10.0,
+    "%/deg": 1.8 / math.pi,
     "1/m": 1.0,
     "1/turn": 0.5 / math.pi,
     "1/%": 100.0,

@@ -48,6 +48,7 @@ SIGNALS = {
     "angle": (-0.1, 2.5),
     "motor_angle": (-2.7, 0.5),
     "spin": (-4.0, 4.0),
+    "acceleration": (-20.0, 20.0),
     "command": (-7.0, 7.0),
     "regulator_time_constant": (0.01, 0.2),
     "opening": (-1.0, 1.0),
