@@ -150,7 +150,7 @@ def inertia_of(diagnosis, plant):
         pytest.param("slide", 0.0, marks=pytest.mark.campaign),
         ("slide", 1.37),
         ("joint", 0.0),
-        ("joint", 1.37),
+        pytest.param("joint", 1.37, marks=pytest.mark.campaign),
     ],
 )
 def test_a_rig_that_hides_nothing_lacks_no_effect_however_it_slips_or_begins(plant, begin):
@@ -322,6 +322,7 @@ def test_a_servo_whose_voltage_is_rebuilt_from_a_guess_decides_nothing(tmp_path)
     assert diagnosis.model == diagnosis.given
 
 
+@pytest.mark.campaign
 def test_an_inertia_far_from_the_data_sheet_is_said_and_what_to_write_helps():
     trials = logs("joint", 2.0)
     diagnosis = diagnose(trials, model("joint", inertia=5.0, presliding=NEAR["joint"]))
