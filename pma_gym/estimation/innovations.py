@@ -472,8 +472,7 @@ class GreyBox:
             e.name: e.parameters(*(point.numbers[f"{e.name}.{stem}"] for stem in e.quantities))
             for e in mounts
         }
-        memories = {name: BRISTLE for e in mounts for name in e.memory_names}
-        return float(mount_error(self.model, parameters, position, first, memories))
+        return float(mount_error(self.model, parameters, position, first))
 
     def asked(self, command: float) -> float:
         """What the drive asks for at a command (N; else the command itself)."""

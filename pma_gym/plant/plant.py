@@ -178,14 +178,12 @@ class Plant(CompiledModel):
     def lagged(self, states: np.ndarray, truth: Mapping[str, np.ndarray]) -> np.ndarray:
         """Sensor outputs before noise, (rows, signals): the lag's state, or the mounted value."""
         columns = [
-            states[:, at] if at >= 0 else truth[name] + self._mounted(name, states, truth[name])
+            states[:, at]
+            if at >= 0
+            else truth[name] + sensors.mount_error(self.model, self.parameters, name, truth[name])
             for at, name in zip(self.sensor_columns, self.outputs, strict=True)
         ]
         return np.stack(columns, axis=1)
-
-    def _mounted(self, output: str, states: np.ndarray, truth: np.ndarray) -> np.ndarray | float:
-        memories = dict(zip(self.states, states.T, strict=True))
-        return sensors.mount_error(self.model, self.parameters, output, truth, memories)
 
     def provenance(self, noise: bool, seed: int | None) -> dict[str, str]:
         """Return the data that reproduce a simulation: model, noise and seed."""

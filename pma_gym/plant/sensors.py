@@ -12,7 +12,6 @@ from pma_gym.data.trial import Trial
 from pma_gym.data.trial_columns import BY_QUANTITY, VOLTAGE_RANGE, SampleError, TrialError
 from pma_gym.effects.contact.imposed_motion import following_rate
 from pma_gym.effects.effect import Parameters
-from pma_gym.effects.effect import signals as names_of
 from pma_gym.effects.ports import MOUNT
 from pma_gym.plant.imposed_motion import level_command, motion_command
 from pma_gym.plant.model import Model
@@ -105,24 +104,17 @@ def mount_error(
     parameters: Mapping[str, Parameters],
     output: str,
     truth: Any,  # noqa: ANN401
-    memories: Mapping[str, Any],
 ) -> Any:  # noqa: ANN401
-    """What the mount of an output's sensor adds to the true value.
+    """What the mount of an output's sensor adds to the true value (SI), a number or an array.
 
     Args:
         model: the model.
         parameters: of the effects at the mount (SI), by name.
         output: the output's name.
-        truth: its value, a number or an array (SI).
-        memories: of the effects at the mount, by the state's name, shaped as the value.
+        truth: its value (SI), a number or an array.
     """
-    total = 0.0
-    for name, effect in model.effects.items():
-        if effect.port == f"{MOUNT}{output}" and effect.law:
-            known = {"signal": truth, "p": parameters[name]}
-            known["memory"] = next((memories[each] for each in effect.memory_names), None)
-            total = total + effect.law(*(known[each] for each in names_of(effect.law)))
-    return total
+    mounts = [e for e in model.effects.values() if e.port == f"{MOUNT}{output}" and e.law]
+    return sum((each.law(truth, parameters[each.name]) for each in mounts if each.law), 0.0)
 
 
 def measure(
