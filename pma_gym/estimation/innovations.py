@@ -6,7 +6,8 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from copy import copy
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, cached_property
+from math import hypot
 from typing import Annotated, NamedTuple
 
 import numpy as np
@@ -323,15 +324,26 @@ class GreyBox:
         rows: the trials.
         channels: signals that are read.
         threads: that run at once, over trials and parameter vectors; the bits are the same.
+        finest: standard deviation of a reading of the position (SI); 0 where none is read.
     """
 
     def __init__(
-        self, model: Model, rows: Sequence[Rows], channels: Sequence[int], threads: int = 1
+        self,
+        model: Model,
+        rows: Sequence[Rows],
+        channels: Sequence[int],
+        threads: int = 1,
+        finest: float = 0.0,
     ) -> None:
-        self.threads = threads
+        self.threads, self.finest = threads, finest
         self.model, self.rows, self.channels = model, list(rows), tuple(channels)
         self.kernel = kernel(model, channels)
         self.order: Array = np.arange(float(len(rows))) - 0.5 * (len(rows) - 1)
+
+    @property
+    def is_rugged(self) -> bool:
+        """Whether the likelihood is: with dry friction, or another law of the way."""
+        return any(effect.rate_independent_law for effect in self.model.effects.values())
 
     def numbers(self) -> dict[str, float]:
         """The model's own parameters (SI) by slot."""
@@ -419,55 +431,75 @@ class GreyBox:
             "process_noise": 2.0 * point.forces[number] ** 2 / point.memory,
         }
         own |= {f"variance {i}": value**2 for i, value in enumerate(point.deviations)}
+        if not any(TRIAL in name or TREND in name for name in point.numbers):
+            own = {**point.numbers, **own}
         return np.array(
             [own[s] if s in own else value_in_trial(point, s, number, self.order) for s in slots]
         )
 
-    def _start(self, trial: Rows, point: Point, number: int, states: Sequence[str]) -> Array:
-        """Mean and covariance at a trial's first row."""
-        signals, plant = self.model.rig.signals, self.model.plant
+    @cached_property
+    def _late(self) -> list[str]:
+        """Effects that make the position's reading late."""
+        port = f"{SENSOR_DELAY}{self.model.rig.signals[0].name}"
+        return [e.name for e in self.model.effects.values() if e.port == port]
+
+    @cached_property
+    def _begins_as(self) -> dict[str, str]:
+        """What each state is at a trial's first row."""
+        signals = self.model.rig.signals
         position, speed = (signal.name for signal in signals[:2])
-        where = {signals[channel].name: i for i, channel in enumerate(self.channels)}
-        first, motion, spread = trial.begin(where.get(position), where.get(speed))
-        level = 2.0 * point.deviations[where[position]] if position in where else 0.0
-        late = [
-            e.name for e in self.model.effects.values() if e.port == f"{SENSOR_DELAY}{position}"
-        ]
-        # A late reading in motion is not where the rig is, and its ladder is not at rest.
-        way = abs(motion) * sum(point.numbers[f"{name}.delay"] for name in late)
-        level = float(np.hypot(np.hypot(level, way), self._mounted(point, position, first)))
-        at = {
-            position: (first, level),
-            SPEEDS[plant]: (motion, spread),
-            f"memory_{LATENT}": (0.0, point.forces[number]),
-        }
-        at |= {
-            f"lag_{signals[0].sensor}": (first, level),
-            f"lag_{signals[1].sensor}": (motion, spread),
-        }
-        asked = self.asked(trial.first), 0.0
         into = {
-            "drive_delay": asked,
-            "drive_lag": asked,
-            f"{SENSOR_DELAY}{position}": (first, level),
-            f"{SENSOR_DELAY}{speed}": (motion, spread),
+            "drive_delay": "asked",
+            "drive_lag": "asked",
+            f"{SENSOR_DELAY}{position}": "position",
+            f"{SENSOR_DELAY}{speed}": "speed",
+        }
+        tags = {
+            position: "position",
+            SPEEDS[self.model.plant]: "speed",
+            f"memory_{LATENT}": "force",
+            f"lag_{signals[0].sensor}": "position",
+            f"lag_{signals[1].sensor}": "speed",
         }
         for effect in self.model.effects.values():
             for number, name in enumerate(effect.memory_names, 1):
                 # At rest the even states of a delay's ladder are what goes into it, the odd ones 0.
                 passed = effect.port in into and (effect.memories == 1 or number % 2 == 0)
-                odd = way if effect.port == f"{SENSOR_DELAY}{position}" else 0.0
-                bristle = 0.0, BRISTLE if effect.rate_independent_law else odd
-                at[name] = into[effect.port] if passed else bristle
-        pairs = [at.get(name, (0.0, 0.0)) for name in states]
-        covariance = np.diag([deviation**2 for _, deviation in pairs])
-        return np.concatenate(
-            [[mean for mean, _ in pairs], covariance[np.tril_indices(len(states))]]
-        )
+                odd = "way" if effect.name in self._late else "nothing"
+                other = "bristle" if effect.rate_independent_law else odd
+                tags[name] = into[effect.port] if passed else other
+        return tags
 
-    def _mounted(self, point: Point, position: str, first: float) -> float:
+    def _start(self, trial: Rows, point: Point, number: int, states: Sequence[str]) -> Array:
+        """Mean and covariance at a trial's first row."""
+        where = {channel: i for i, channel in enumerate(self.channels)}
+        first, motion, spread = trial.begin(where.get(0), where.get(1))
+        level = 2.0 * point.deviations[where[0]] if 0 in where else 0.0
+        # A late reading in motion is not where the rig is, and its ladder is not at rest.
+        way = abs(motion) * sum(point.numbers[f"{name}.delay"] for name in self._late)
+        level = hypot(level, way, self._mounted(point, first))
+        pairs = {
+            "position": (first, level),
+            "speed": (motion, spread),
+            "force": (0.0, point.forces[number]),
+            "asked": (self.asked(trial.first), 0.0),
+            "way": (0.0, way),
+            "bristle": (0.0, BRISTLE),
+            "nothing": (0.0, 0.0),
+        }
+        n = len(states)
+        out = np.zeros(n + n * (n + 1) // 2)
+        for i, name in enumerate(states):
+            out[i], deviation = pairs[self._begins_as.get(name, "nothing")]
+            out[n + i * (i + 3) // 2] = deviation**2
+        return out
+
+    def _mounted(self, point: Point, first: float) -> float:
         """What the mount of the position's sensor may add to a first reading."""
+        position = self.model.rig.signals[0].name
         mounts = [e for e in self.model.effects.values() if e.port == f"{MOUNT}{position}"]
+        if not mounts:
+            return 0.0
         parameters = {
             e.name: e.parameters(*(point.numbers[f"{e.name}.{stem}"] for stem in e.quantities))
             for e in mounts

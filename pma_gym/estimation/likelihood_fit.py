@@ -13,12 +13,19 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from pma_gym.estimation.innovations import TURNS, GreyBox, Point, log_likelihood
+from pma_gym.estimation.innovations import GreyBox, Point, log_likelihood
 
 Array = NDArray[np.float64]
 
 STEP = 1e-4
 """Step of derivatives, in units of a coordinate."""
+
+WIDE_STEPS = 3e-2, 3e-3
+"""The same where a likelihood is rugged, one after the other, and `STEP` last.
+
+Where friction turns a row earlier or later the likelihood jumps, and a short step sees no slope but
+that of a jump.
+"""
 
 MOST_ITERATIONS, LEAST_GAIN = 40, 0.05
 """Of a fit; it ends where an iteration gains less."""
@@ -105,7 +112,6 @@ class Fit:
         tied: slots that follow another slot.
         information: expected information, shape (p, p), in the coordinates' units.
         scores: of each block of readings, shape (blocks, p).
-        shifts: by which coarser integration moves each coordinate, shape (p,), or none.
     """
 
     point: Point
@@ -114,7 +120,6 @@ class Fit:
     tied: Mapping[str, str]
     information: Array
     scores: Array
-    shifts: Array | float = 0.0
 
     @cached_property
     def curvature(self) -> Array:
@@ -123,14 +128,11 @@ class Fit:
 
     @cached_property
     def deviations(self) -> dict[str, float]:
-        """Standard errors (SI) by name, by the sandwich of information and scores.
-
-        With what integration moves, as another error.
-        """
+        """Standard errors (SI) by name, by the sandwich of information and scores."""
         bread = self.curvature
         meat = self.scores.T @ self.scores
         wide = np.maximum(np.diag(bread @ meat @ bread), np.diag(bread))
-        errors = np.sqrt(np.maximum(wide, 0.0) + np.square(self.shifts))
+        errors = np.sqrt(np.maximum(wide, 0.0))
         sizes = [
             value_of(self.point, c.name) if c.logarithmic else c.scale for c in self.coordinates
         ]
@@ -138,17 +140,6 @@ class Fit:
             c.name: float(e * abs(s))
             for c, e, s in zip(self.coordinates, errors, sizes, strict=True)
         }
-
-    def moved_from(self, coarser: "Fit") -> "Fit":
-        """With what its integration may still be off by as an error.
-
-        By a fit of the same whose steps are `TURNS` times as long where the motion turns: a turn
-        within a step is of order 1.
-        """
-        known = {c.name for c in coarser.coordinates}
-        points = [(c, coarser.point if c.name in known else self.point) for c in self.coordinates]
-        apart = np.array([c.of(self.point) - c.of(p) for c, p in points])
-        return replace(self, shifts=apart / (TURNS - 1.0))
 
     def moved(self, name: str, x: float) -> Point:
         """The point with one coordinate elsewhere."""
@@ -167,6 +158,7 @@ def fit(
     coordinates: Sequence[Coordinate],
     tied: Mapping[str, str],
     rough: bool = False,
+    near: bool = False,
 ) -> Fit:
     """Greatest likelihood from a start.
 
@@ -176,6 +168,7 @@ def fit(
         coordinates: what is free.
         tied: slots that follow another slot.
         rough: whether to end early, for a comparison of starts.
+        near: whether the start is where another fit ended.
     """
     most, least = ROUGH if rough else (MOST_ITERATIONS, LEAST_GAIN)
     origin = np.array([c.of(start) for c in coordinates])
@@ -196,24 +189,27 @@ def fit(
     x, damping, p = within(origin), 1e-3, len(coordinates)
     best = float(valued([x])[0][0])
     information, scores = np.eye(p), np.zeros((BLOCKS, p))
+    sizes = [*(WIDE_STEPS if box.is_rugged and not near else ()), STEP]
     # A start whose filter fails has no slopes to go by: it is less likely than any other.
     for _ in range(most if np.isfinite(best) else 0):
-        signs = np.where(within(x + STEP) > x, STEP, -STEP)
+        size = sizes[0]
+        signs = np.where(within(x + size) > x, size, -size)
         _, results = valued([x, *(x + np.diag(signs))])
         information, scores = _scored(box, results, signs)
         gradient = scores.sum(axis=0) - weight * (x - origin)
         information += np.diag(weight)
         # What is at an end of its range and drawn beyond it takes no part in the step.
-        out = (within(x + STEP * np.sign(gradient)) == x) & (gradient != 0.0)
+        out = (within(x + size * np.sign(gradient)) == x) & (gradient != 0.0)
         steps = [within(x + step) for step in _damped(information, gradient, out, damping)]
         values, _ = valued(steps)
         at = int(np.argmax(values))
         gain = float(values[at]) - best
-        if not gain > 0.0:
-            break
-        x, best = steps[at], float(values[at])
-        damping = float(np.clip(damping * 10.0 ** (at - 2), 1e-6, 1e3))
-        if gain < least:
+        if gain > 0.0:
+            x, best = steps[at], float(values[at])
+            damping = float(np.clip(damping * 10.0 ** (at - 2), 1e-6, 1e3))
+        if not gain > least:
+            sizes = sizes[1:]
+        if not sizes:
             break
     return Fit(point(x), best, tuple(coordinates), dict(tied), information, scores)
 

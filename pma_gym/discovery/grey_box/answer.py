@@ -194,7 +194,6 @@ def answered(
     with kept_in(journal):
         path = [first_fit(trials, seed, tell)] if candidates is None else selection.run()
         tell("putting the answer together", 0, 1)
-        path = selection.confirmed(path)
         predictions = Predictions(trials, path, tell)
         proposal = Proposal(selection, predictions, candidates or ())
         conclusions = Conclusions(selection, predictions, proposal, named, limits)

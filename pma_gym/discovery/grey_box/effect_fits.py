@@ -6,8 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from pma_gym.discovery.grey_box.first_fit import SHARES
-from pma_gym.discovery.grey_box.hypothesis import Hypothesis, Move, added_paths
-from pma_gym.discovery.grey_box.kept_fits import fit
+from pma_gym.discovery.grey_box.hypothesis import Hypothesis, Move, added_paths, precise_fit
 from pma_gym.discovery.grey_box.prepared_trials import PreparedTrials
 from pma_gym.discovery.grey_box.slots import presliding, quantity_of, slot, values_of
 from pma_gym.discovery.grey_box.thresholds import ODD
@@ -59,21 +58,22 @@ def tried(trials: PreparedTrials, now: Hypothesis, move: Move, careful: bool = F
                 quantity_of(slot(path)).to_si(float(v)) for v in (0.0, far, low, high)
             )
             more.append(Coordinate(slot(path), abs(size - zero) or 1.0, False, least, most))
-    more += [presliding(candidate.effect)] if "presliding" in law.scanned else []
+    more += [presliding(candidate.effect, box)] if "presliding" in law.scanned else []
     here = move.start or now.fit.point
     whole = replace(here, numbers={**box.numbers(), **here.numbers})
     sized = [slot(p) for p, size in zip(candidate.paths, candidate.amplitudes, strict=True) if size]
     starts = _starts(trials, box, whole, at, absent, sized, more, tied)
     coordinates = [*now.fit.coordinates, *more]
-    box = trials.precise(box.model, starts[0], now.box.rows[0].steps)
     chosen = starts[FITTED:][:FURTHER] if careful else starts[:FITTED]
-    fits = [fit(box, start, coordinates, tied) for start in chosen]
-    if all(made.value < now.fit.value for made in fits):
+    fits = [
+        precise_fit(trials, box, start, coordinates, tied, rough=not careful) for start in chosen
+    ]
+    if all(made.fit.value < now.fit.value for made in fits):
         # From none of it, a fit is no less likely than without.
         none = with_values(whole, with_tied({**at, **absent}, tied))
-        fits += [fit(box, none, coordinates, tied, rough=True)]
-    best = max(fits, key=lambda made: made.value)
-    return Hypothesis(box, best, (*now.moves, move), now.rivals)
+        fits += [precise_fit(trials, box, none, coordinates, tied, rough=True)]
+    best = max(fits, key=lambda made: made.fit.value)
+    return replace(best, moves=(*now.moves, move), rivals=now.rivals)
 
 
 def _starts(
@@ -106,6 +106,8 @@ def _starts(
                 start = with_values(whole, with_tied(values, tied))
                 points.append(weaker(trials, start, less))
                 kinds.append(slip if slips else less)
+    # Of the shortest way, where steps are to be the shortest.
+    box = trials.precise(box.model, points[0], box.rows[0].steps)
     likely = log_likelihood(box.innovations(points), box.rows)
     order = np.argsort(-likely)
     first = {kind: at for at, kind in reversed([(i, kinds[i]) for i in order])}
@@ -147,9 +149,12 @@ def _varied(trials: PreparedTrials, now: Hypothesis, move: Move, careful: bool) 
         ]
         likely = log_likelihood(now.box.innovations(here), now.box.rows)
         starts += [here[i] for i in np.argsort(-likely)[: 1 + careful]]
-    fits = [fit(now.box, start, coordinates, tied, rough=not careful) for start in starts]
-    best = max(fits, key=lambda made: made.value)
-    return Hypothesis(now.box, best, (*now.moves, move), now.rivals)
+    fits = [
+        precise_fit(trials, now.box, start, coordinates, tied, rough=not careful)
+        for start in starts
+    ]
+    best = max(fits, key=lambda made: made.fit.value)
+    return replace(best, moves=(*now.moves, move), rivals=now.rivals)
 
 
 def weaker(trials: PreparedTrials, point: Point, share: float) -> Point:

@@ -14,7 +14,6 @@ from pma_gym.discovery.grey_box.moves import Screening
 from pma_gym.discovery.grey_box.prepared_trials import PreparedTrials, is_rough
 from pma_gym.discovery.grey_box.refined_fits import (
     again,
-    finest,
     other_hold,
     refined,
     trend_instead,
@@ -74,7 +73,6 @@ class EffectSelection:
         self.candidates = [each for each in candidates if each.name not in (*late, *SIMULATED)]
         self.gains: dict[str, float] = {}
         self.fitted: dict[frozenset[str], Hypothesis] = {}
-        self._fine: dict[int, tuple[Hypothesis, Hypothesis]] = {}
 
     def run(self) -> list[Hypothesis]:
         """From the model as it came to the last hypothesis that is worth its price.
@@ -101,11 +99,12 @@ class EffectSelection:
             self.tell(f"effect {stage + 1}", self.planned * 5 // 6, self.planned)
             # Others begin where the likeliest one ended: no start is ahead.
             for at, (*before, last) in enumerate(chains[1:BEAM], 1):
-                chains[at] = [*before, again(last, chains[0][-1])]
+                chains[at] = [*before, again(self.trials, last, chains[0][-1])]
             chains.sort(key=self._worth, reverse=True)
             self._keep(chains)
             *before, now, last = chains[0]
-            chain = [*before, again(now, last), last]
+            last = again(self.trials, last, last)
+            chain = [*before, again(self.trials, now, last), last]
             if not before:
                 best = chain[:1]
             if self._lead(chain[:-1], best) > 0.0:
@@ -192,21 +191,6 @@ class EffectSelection:
         edges = np.linspace(0, len(differ), BLOCKS + 1).astype(int)[:-1]
         scatter = BLOCKS**0.5 * float(np.std(np.add.reduceat(differ, edges)))
         return lead >= CONFIDENCE * scatter
-
-    def finest(self, each: Hypothesis) -> Hypothesis:
-        """A hypothesis with dry friction, fitted once more with fine steps."""
-        if id(each) not in self._fine:
-            self._fine[id(each)] = each, finest(self.trials, each)
-        return self._fine[id(each)][1]
-
-    def confirmed(self, path: Sequence[Hypothesis]) -> list[Hypothesis]:
-        """Hypotheses without the last that make up for coarse steps where friction turns alone."""
-        kept = list(path)
-        while len(kept) > 1 and is_rough(kept[-2].box.model):
-            if self._is_ahead(*map(self.finest, (kept[-1], kept[-2]))):
-                break
-            kept.pop()
-        return kept
 
 
 def _cost(now: Hypothesis, move: Move) -> int:

@@ -5,16 +5,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from pma_gym.discovery.grey_box.hypothesis import Hypothesis
+from pma_gym.discovery.grey_box.hypothesis import Hypothesis, precise_fit
 from pma_gym.discovery.grey_box.kept_fits import fit
 from pma_gym.discovery.grey_box.prepared_trials import PreparedTrials, is_rough
 from pma_gym.discovery.grey_box.slots import own_coordinates
 from pma_gym.discovery.grey_box.thresholds import LEAST_TRIALS, ODD
 from pma_gym.estimation.innovations import GreyBox, Point, log_likelihood
-from pma_gym.estimation.likelihood_fit import Coordinate, Fit, value_of, with_tied, with_values
-from pma_gym.plant.model import Model
+from pma_gym.estimation.likelihood_fit import Coordinate, value_of, with_tied, with_values
 
-STARTS, SMOOTH_STARTS = 8, 3
+STARTS, SMOOTH_STARTS = 5, 3
 """Of the first fit, with and without dry friction, whose likelihood is rugged."""
 
 MOST_TRIALS = 6
@@ -32,11 +31,14 @@ AGREEING, ALIKE = 3, 0.5
 SCATTER = 0.2
 """Standard deviation of a start's parameters, as a share of them."""
 
-SHARES = (0.1, 0.01, 0.03, 0.003)
+SHARES = (0.1, 0.03, 0.1, 0.01)
 """Latent force at the starts, as a share of the drive's.
 
 Small, so that it swallows nothing at first.
 """
+
+SOONER = 0.1
+"""Share of the presliding distance that a fit begins again with."""
 
 DELAY_ROWS = (0.0, 0.5, 1.0, 2.0, 3.0, 5.0, 8.0, 12.0)
 """Delays (rows) of which a start takes the likeliest."""
@@ -51,33 +53,32 @@ def first_fit(
     rough, number = is_rough(trials.model), len(trials.logged)
     count = STARTS if rough else SMOOTH_STARTS
     kinds: Sequence[bool] = (False, True)
-    fits: dict[bool, list[Fit]] = {linear: [] for linear in kinds}
-    first = _begin(trials, seed, trials.box(trials.model), coordinates, tied, 0, -1)
-    boxes = [trials.precise(trials.model, first, linear=linear) for linear in kinds]
-    trials.steps = max(box.rows[0].steps for box in boxes)
+    fits: dict[bool, list[Hypothesis]] = {linear: [] for linear in kinds}
+
+    def best(linear: bool) -> Hypothesis:
+        return max(fits[linear], key=lambda each: each.fit.value)
 
     def start(k: int, odd: int) -> None:
         for linear in kinds:
             # It may end after `AGREEING`: between that and all, until then.
             tell("refitting parameters", k, count + 2 if k > AGREEING else (count + AGREEING) // 2)
             box = trials.box(trials.model, linear)
-            fits[linear].append(
-                fit(box, _begin(trials, seed, box, coordinates, tied, k, odd), coordinates, tied)
-            )
+            begin = _begin(trials, seed, box, coordinates, tied, k, odd)
+            fits[linear].append(precise_fit(trials, box, begin, coordinates, tied, linear=linear))
 
     for k in range(count):
         start(k, -1)
-        kinds = (max(fits, key=lambda each: max(f.value for f in fits[each])),) if k else kinds
-        values = sorted(f.value for f in fits[kinds[0]])
+        kinds = (max(fits, key=lambda each: best(each).fit.value),) if k else kinds
+        values = sorted(each.fit.value for each in fits[kinds[0]])
         if len(values) >= AGREEING and values[-1] - values[-AGREEING] < ALIKE:
             break
     trials.linear = kinds[0]
     if rough:
-        best = max(fits[trials.linear], key=lambda each: each.value)
+        now = best(trials.linear)
         for linear in fits:
-            fits[linear] += hold_fits(trials, best, trials.model, linear, trials.steps)
-        trials.linear = max(fits, key=lambda each: max(f.value for f in fits[each]))
-    forces = max(fits[trials.linear], key=lambda each: each.value).point.forces
+            fits[linear] += hold_fits(trials, now, linear)
+        trials.linear = max(fits, key=lambda each: best(each).fit.value)
+    forces = best(trials.linear).fit.point.forces
     if (
         LEAST_TRIALS <= number <= MOST_TRIALS
         and max(forces) > ODD * min(forces)
@@ -85,8 +86,7 @@ def first_fit(
     ):
         for odd in range(number):
             start(0, odd)
-    best = max(fits[trials.linear], key=lambda each: each.value)
-    return Hypothesis(trials.box(trials.model), best)
+    return best(trials.linear)
 
 
 def _begin(
@@ -123,23 +123,31 @@ def _begin(
     return late[int(np.argmax(log_likelihood(box.innovations(late), box.rows)))]
 
 
-def hold_fits(
-    trials: PreparedTrials, best: Fit, model: Model, linear: bool, steps: int, fine: bool = False
-) -> list[Fit]:
-    """Fits with commands held or linear between rows, from a fit that has them either way.
+def hold_fits(trials: PreparedTrials, now: Hypothesis, linear: bool) -> list[Hypothesis]:
+    """Fits with commands held or linear between rows, from one that has them either way.
 
-    A held command is a line half a row later. Friction that begins to slip too late hides
-    which it is, so that both begin a second time with a tenth of the presliding distance.
+    A held command is a line half a row later. Friction that begins to slip too late hides which it
+    is, and its fits end where they began: both begin again with a share of the presliding distance
+    for as long as that is likelier.
     """
-    box, point = trials.box(model, linear, steps, fine), best.point
+    fit_, point = now.fit, now.fit.point
     row = 0.5 * trials.span / trials.stride / trials.block * (int(linear) - int(trials.linear))
-    late = any(c.name == "delay" for c in best.coordinates)
-    fits = []
-    for sooner in (1.0, 0.1) if is_rough(model) else (1.0,):
-        slip = {n: sooner * v for n, v in point.numbers.items() if n.endswith(".presliding")}
-        start = with_values(point, {**slip, "delay": max(0.0, point.delay + row * late)})
-        fits.append(fit(box, start, best.coordinates, best.tied, rough=True))
-    return fits
+    late = any(c.name == "delay" for c in fit_.coordinates)
+    start = with_values(point, {"delay": max(0.0, point.delay + row * late)})
+    fits = list[Hypothesis]()
+    while True:
+        made = precise_fit(
+            trials, now.box, start, fit_.coordinates, fit_.tied, rough=True, linear=linear
+        )
+        fits.append(replace(now, box=made.box, fit=made.fit))
+        last = made.fit.point
+        slip = {n: SOONER * v for n, v in last.numbers.items() if n.endswith(".presliding")}
+        start = with_values(
+            last, {c.name: max(c.lower, slip[c.name]) for c in fit_.coordinates if c.name in slip}
+        )
+        before = max((each.fit.value for each in fits[:-1]), default=-np.inf)
+        if start == last or made.fit.value < before + ALIKE:
+            return fits
 
 
 def unmoved(trials: PreparedTrials, base: Hypothesis) -> Hypothesis:

@@ -1,14 +1,17 @@
 """What a model may lack, and a model with what was added."""
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
+from pma_gym.discovery.grey_box.kept_fits import fit
+from pma_gym.discovery.grey_box.prepared_trials import CLOSE, ROUGH, PreparedTrials
 from pma_gym.discovery.grey_box.slots import slot
 from pma_gym.effects import CATALOGUE
 from pma_gym.estimation.innovations import GreyBox, Point
-from pma_gym.estimation.likelihood_fit import Fit
+from pma_gym.estimation.likelihood_fit import Coordinate, Fit
 
 
 @dataclass(frozen=True)
@@ -71,3 +74,34 @@ def added_paths(candidate: CandidateEffect) -> list[str]:
         stem for term in law.terms for stem in term
     }
     return [path for path in candidate.fitted_paths if slot(path).partition(".")[2] not in apart]
+
+
+def precise_fit(
+    trials: PreparedTrials,
+    box: GreyBox,
+    start: Point,
+    coordinates: Sequence[Coordinate],
+    tied: Mapping[str, str],
+    rough: bool = False,
+    linear: bool | None = None,
+) -> Hypothesis:
+    """A fit with as many integration steps as it needs where it begins and where it ends.
+
+    Args:
+        trials: that are fitted to.
+        box: a filter of the model.
+        start: where to begin.
+        coordinates: what is free.
+        tied: slots that follow another slot.
+        rough: whether to end early, for a comparison of starts.
+        linear: whether commands are linear between rows; None: as the likeliest fit has them.
+    """
+    level = ROUGH if rough else CLOSE
+    box = trials.precise(box.model, start, linear=linear, level=level)
+    made = fit(box, start, coordinates, tied, rough)
+    while not trials.is_missed(trials.white(box, [made.point])):
+        finer = trials.precise(box.model, made.point, box.rows[0].steps, linear, level)
+        if finer.rows[0].steps == box.rows[0].steps:
+            break
+        box, made = finer, fit(finer, made.point, coordinates, tied, rough, near=True)
+    return Hypothesis(box, made)

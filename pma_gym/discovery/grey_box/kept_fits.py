@@ -40,11 +40,12 @@ def fit(
     coordinates: Sequence[Coordinate],
     tied: Mapping[str, str],
     rough: bool = False,
+    near: bool = False,
 ) -> Fit:
     """`likelihood_fit.fit`, or the same bits from the journal where it was made before."""
     journal = _JOURNAL.get()
     if journal is None:
-        return likelihood_fit.fit(box, start, coordinates, tied, rough)
+        return likelihood_fit.fit(box, start, coordinates, tied, rough, near)
 
     def restored(entry: dict[str, Any]) -> Fit:
         names = [c.name for c in coordinates]
@@ -59,10 +60,10 @@ def fit(
         point = with_values(start, with_tied(known, tied))
         return Fit(point, value, tuple(coordinates), dict(tied), information, scores)
 
-    name = _name(box, start, coordinates, tied, rough)
+    name = _name(box, start, coordinates, tied, rough, near)
     kept = journal.restored(name, restored)
     if kept is None:
-        kept = likelihood_fit.fit(box, start, coordinates, tied, rough)
+        kept = likelihood_fit.fit(box, start, coordinates, tied, rough, near)
         journal.keep(
             name,
             {
@@ -80,10 +81,10 @@ def _name(
     start: Point,
     coordinates: Sequence[Coordinate],
     tied: Mapping[str, str],
-    rough: bool,
+    *how: bool,
 ) -> str:
     """What determines a fit, in a few characters."""
-    numbers = repr((start, list(coordinates), dict(tied), rough, box.channels))
+    numbers = repr((start, list(coordinates), dict(tied), how, box.channels))
     total = hashlib.sha256(f"{dump_model(box.model)} {numbers}".encode())
     for rows in box.rows:
         for values in (rows.lengths, rows.commands(0.0), rows.readings, rows.there):

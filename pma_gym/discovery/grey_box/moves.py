@@ -116,8 +116,9 @@ class Screening:
                 if not np.isfinite(row).all():
                     continue
                 change = beyond(row - error)
-                square = float(change @ change)
-                if square < NOTHING:
+                with np.errstate(over="ignore"):
+                    square = float(change @ change)
+                if not NOTHING < square < np.inf:
                     continue
                 amount = -float(left @ change) / square
                 if amount < 0.0 and not candidate.signs[i]:

@@ -76,7 +76,7 @@ class Predictions:
             for i in left:
                 rows[i].there = np.zeros_like(rows[i].there)
             box = GreyBox(each.box.model, rows, each.box.channels, each.box.threads)
-            made = fit(box, each.fit.point, each.fit.coordinates, each.fit.tied)
+            made = fit(box, each.fit.point, each.fit.coordinates, each.fit.tied, near=True)
             forces = {f"force {i}": value_of(each.fit.point, f"force {i}") for i in left}
             curves = predictions(each.box, with_values(made.point, forces), self.horizon)
             for i in left:

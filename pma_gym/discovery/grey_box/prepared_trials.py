@@ -1,7 +1,6 @@
 """What the trials of a rig say before any fit, and how a model is run over them."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,16 +14,21 @@ from pma_gym.plant.model import Model
 
 Array = NDArray[np.float64]
 
-PRECISE, MOST_STEPS, SHORTEST_S = 1.0, 200_000, 1e-4
-"""Integration steps are halved until that changes all innovations by less.
+ROUGH, CLOSE, FINAL = (10.0, 200_000), (1.0, 200_000), (0.1, 1_000_000)
+"""Integration steps are halved until that changes all innovations by less, and their number.
 
-Sum of their squares, in their deviations, so that log likelihoods are right to about one unit. And
-steps of all trials together at most, and the shortest step: where friction turns, no step is short
-enough for such precision.
+Sum of the changes' squares, in deviations of the innovations, so that log likelihoods are right to
+a few units where starts are compared, to one where hypotheses are, and to less at the end. And
+steps of all trials together at most: where friction that no model has quite right turns, no step is
+short enough.
 """
 
-FINEST_STEPS = 400_000
-"""Steps of all trials together at most where sizes are fitted once more, with fine steps."""
+SHORTEST_S = 1e-4
+"""Shortest step (s) where the motion does not turn."""
+
+MISSED, HOPELESS = 4.0, 0.1
+"""Mean square of innovations, in their deviations, from which on a point is no fit, and share of
+it by which halved steps may change it there."""
 
 MOST_ROWS = 8_000
 """Of all trials together.
@@ -84,7 +88,7 @@ class PreparedTrials:
         longest = max(float(each.time[-1] - each.time[0]) for each in logged)
         self.memory = 4.0 * self.span, max(longest / 5.0, 8.0 * self.span)
         self.noise = [n / self.block**0.5 for n in self.noise]
-        self._rows: dict[tuple[int, bool, bool, bool], list[Rows]] = {}
+        self._rows: dict[tuple[int, bool, bool], list[Rows]] = {}
         self.force = self._force()
 
     def _block(self, readings: Sequence[Sequence[Array]]) -> int:
@@ -115,24 +119,20 @@ class PreparedTrials:
             forces.append(drive.law(*(at[name] for name in signals(drive.law))))
         return abs(forces[0] - forces[1]) or 1.0
 
-    def box(
-        self, model: Model, linear: bool | None = None, steps: int = 0, fine: bool = False
-    ) -> GreyBox:
+    def box(self, model: Model, linear: bool | None = None, steps: int = 0) -> GreyBox:
         """The filter of a model over the trials, with so many integration steps a row.
 
-        Where friction turns nothing is smooth, and extrapolation would only make more of it, unless
-        steps are fine there.
+        Where friction turns nothing is smooth: steps are finer there, and none is extrapolated.
         """
         steps = steps or self.steps
         linear = self.linear if linear is None else linear
-        key = steps, linear, is_rough(model), fine
+        key = steps, linear, is_rough(model)
         if key not in self._rows:
             how = self.channels, steps, linear, self.block, self.stride, self.coarse
-            noise = self.noise if is_rough(model) and fine else ()
-            self._rows[key] = [
-                Rows(each, *how, fine or not is_rough(model), noise) for each in self.logged
-            ]
-        return GreyBox(model, self._rows[key], self.channels, self.threads)
+            noise = self.noise if is_rough(model) else ()
+            self._rows[key] = [Rows(each, *how, not is_rough(model), noise) for each in self.logged]
+        finest = self.noise[0] if self.channels[0] == 0 else 0.0
+        return GreyBox(model, self._rows[key], self.channels, self.threads, finest)
 
     def precise(
         self,
@@ -140,26 +140,23 @@ class PreparedTrials:
         point: Point,
         steps: int = 0,
         linear: bool | None = None,
-        fine: bool = False,
+        level: tuple[float, int] = CLOSE,
     ) -> GreyBox:
-        """The filter of a model with as many steps as it needs at a point, at least so many.
-
-        Beside next to no latent force: what it makes uncertain needs less.
-        """
-        rows, steps = self.stride * self.block, steps or self.steps
-        point = replace(point, forces=(LEAST_FORCE * self.force,) * len(self.logged))
-        shortest, most = (0.0, FINEST_STEPS) if fine else (SHORTEST_S, MOST_STEPS)
-        box = self.box(model, linear, steps, fine)
+        """The filter of a model with as many steps as it needs at a point, at least so many."""
+        (change, total), rows = level, self.stride * self.block
+        steps = steps or self.steps
+        box = self.box(model, linear, steps)
         white = self.white(box, [point])
         while (
-            2 * steps * shortest <= self.span
-            and 2 * sum(each.firsts[-1] for each in box.rows) <= most
+            2 * steps * SHORTEST_S <= self.span
+            and 2 * sum(each.firsts[-1] for each in box.rows) <= total
         ):
             # Where several rows are one step, the next has each by itself.
             steps = rows if steps < rows < 2 * steps else 2 * steps
-            finer = self.box(model, linear, steps, fine)
+            finer = self.box(model, linear, steps)
             before, white = white, self.white(finer, [point])
-            if np.sum((white - before) ** 2) < PRECISE:
+            most = HOPELESS * np.sum(white**2) if self.is_missed(white) else change
+            if np.sum((white - before) ** 2) < most:
                 break
             box = finer
         return box
@@ -172,6 +169,10 @@ class PreparedTrials:
                 for (errors, spreads), trial in zip(box.innovations(points), box.rows, strict=True)
             ]
         return np.concatenate(rows, axis=1)
+
+    def is_missed(self, white: Array) -> bool:
+        """Whether innovations, in their deviations, are those of a point that is no fit."""
+        return not float(np.mean(white**2)) < MISSED
 
     def nuisances(self) -> list[Coordinate]:
         """Coordinates of the noises, the latent force and the delay."""

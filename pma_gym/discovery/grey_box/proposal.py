@@ -13,7 +13,7 @@ from pma_gym.discovery.grey_box.first_fit import hold_fits
 from pma_gym.discovery.grey_box.hypothesis import Hypothesis, Move
 from pma_gym.discovery.grey_box.kept_fits import fit
 from pma_gym.discovery.grey_box.predictions import Predictions
-from pma_gym.discovery.grey_box.prepared_trials import LEAST_FORCE
+from pma_gym.discovery.grey_box.prepared_trials import FINAL, LEAST_FORCE
 from pma_gym.discovery.grey_box.slots import gains_of_drive, quantity_of, slot
 from pma_gym.discovery.grey_box.thresholds import FAR, LIKE, NOISES, SMALL
 from pma_gym.discovery.result.misfit import rms
@@ -40,13 +40,18 @@ class Proposal:
     @cached_property
     def last(self) -> Hypothesis:
         """The hypothesis that is proposed, without a delay that is not worth its price."""
-        chosen = self.selection.finest(self._chosen)
+        chosen, trials = self._chosen, self.selection.trials
+        now = chosen.fit
+        box = trials.precise(chosen.box.model, now.point, chosen.box.rows[0].steps, level=FINAL)
+        now = fit(box, now.point, now.coordinates, now.tied, near=True)
+        chosen = replace(chosen, box=box, fit=now)
         prompt = [c for c in chosen.fit.coordinates if c.name != "delay"]
-        made = fit(chosen.box, replace(chosen.fit.point, delay=0.0), prompt, chosen.fit.tied)
+        start = replace(chosen.fit.point, delay=0.0)
+        made = fit(chosen.box, start, prompt, chosen.fit.tied, near=True)
         least = chosen.fit.value - chosen.price_of(1) - LIKE
         if made.value > least:
             chosen = replace(chosen, fit=made)
-        return replace(chosen, fit=chosen.fit.moved_from(self._chosen.fit))
+        return chosen
 
     @cached_property
     def _chosen(self) -> Hypothesis:
@@ -138,9 +143,8 @@ class Proposal:
         prompt = tuple(c for c in last.fit.coordinates if c.name != "delay")
         start = replace(last.fit, point=replace(last.fit.point, delay=0.0), coordinates=prompt)
         for linear in (False, True):
-            steps = last.box.rows[0].steps
-            made = hold_fits(self.selection.trials, start, last.box.model, linear, steps, fine=True)
-            values += [each.value for each in made]
+            made = hold_fits(self.selection.trials, replace(last, fit=start), linear)
+            values += [each.fit.value for each in made]
         return max(values)
 
     @property

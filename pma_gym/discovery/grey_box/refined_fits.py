@@ -8,9 +8,8 @@ import numpy as np
 from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
 from pma_gym.discovery.grey_box.effect_fits import tried, weaker
 from pma_gym.discovery.grey_box.first_fit import hold_fits
-from pma_gym.discovery.grey_box.hypothesis import Hypothesis, Move
-from pma_gym.discovery.grey_box.kept_fits import fit
-from pma_gym.discovery.grey_box.prepared_trials import PreparedTrials, is_rough
+from pma_gym.discovery.grey_box.hypothesis import Hypothesis, Move, precise_fit
+from pma_gym.discovery.grey_box.prepared_trials import PreparedTrials
 from pma_gym.discovery.grey_box.slots import quantity_of, slot, values_of
 from pma_gym.discovery.grey_box.thresholds import LIKE, LINE
 from pma_gym.effects import CATALOGUE
@@ -19,10 +18,6 @@ from pma_gym.estimation.likelihood_fit import Coordinate, value_of, with_tied, w
 
 WIDER = (1.0, 0.2, 5.0)
 """Times the usual shape (a Stribeck speed) from which the fuller law of an effect is fitted."""
-
-
-COARSER, LESS_SLIP = 4, (1.0, 0.1)
-"""Of the last fits: share of the former steps that they begin with, times the presliding."""
 
 
 def refined(trials: PreparedTrials, now: Hypothesis) -> Hypothesis:
@@ -62,24 +57,25 @@ def _freed(
         return now
     # What is free already begins again from other shapes.
     coordinates = {c.name: c for c in (*now.fit.coordinates, *more)}.values()
-    best = now.fit
+    best = now
     for wide in WIDER:
         shaped = {n: v * (1.0 if n in now.fit.tied else wide) for n, v in values.items()}
         start = with_values(point, with_tied(shaped, tied))
-        made = fit(now.box, weaker(trials, start, 0.3), list(coordinates), tied)
-        best = made if made.value > best.value else best
-    return replace(now, fit=best)
+        begin = weaker(trials, start, 0.3)
+        made = precise_fit(trials, now.box, begin, list(coordinates), tied, rough=True)
+        best = made if made.fit.value > best.fit.value else best
+    return again(trials, replace(now, box=best.box, fit=best.fit), best)
 
 
 def other_hold(trials: PreparedTrials, now: Hypothesis) -> Hypothesis:
     """The same hypothesis, with commands between rows the other way if that is likelier."""
-    steps, kinds = now.box.rows[0].steps, (trials.linear, not trials.linear)
-    fits = [(f, k) for k in kinds for f in hold_fits(trials, now.fit, now.box.model, k, steps)]
-    made, linear = max(fits, key=lambda pair: pair[0].value)
-    if made.value < now.fit.value + LIKE:
+    kinds = trials.linear, not trials.linear
+    fits = [(made, kind) for kind in kinds for made in hold_fits(trials, now, kind)]
+    made, linear = max(fits, key=lambda pair: pair[0].fit.value)
+    if made.fit.value < now.fit.value + LIKE:
         return now
     trials.linear = linear
-    return replace(now, box=trials.box(now.box.model, linear, steps), fit=made)
+    return made
 
 
 def trend_instead(trials: PreparedTrials, now: Hypothesis) -> Hypothesis:
@@ -107,31 +103,13 @@ def trend_instead(trials: PreparedTrials, now: Hypothesis) -> Hypothesis:
     return now
 
 
-def again(now: Hypothesis, larger: Hypothesis) -> Hypothesis:
+def again(trials: PreparedTrials, now: Hypothesis, larger: Hypothesis) -> Hypothesis:
     """A hypothesis fitted again from where another one ended."""
     shared = {c.name for c in larger.fit.coordinates}
     values = {
         c.name: value_of(larger.fit.point, c.name) for c in now.fit.coordinates if c.name in shared
     }
     start = with_values(now.fit.point, with_tied(values, now.fit.tied))
-    made = fit(now.box, start, now.fit.coordinates, now.fit.tied)
-    return replace(now, fit=max(made, now.fit, key=lambda each: each.value))
-
-
-def finest(trials: PreparedTrials, now: Hypothesis) -> Hypothesis:
-    """A hypothesis with dry friction, fitted once more with steps that are fine where it turns.
-
-    Also from a tenth of the presliding distance: coarse steps want it larger than it is.
-    """
-    if not is_rough(now.box.model):
-        return now
-    box = trials.precise(
-        now.box.model, now.fit.point, max(1, now.box.rows[0].steps // COARSER), fine=True
-    )
-    slips = {n: v for n, v in now.fit.point.numbers.items() if n.endswith(".presliding")}
-    starts = [
-        with_values(now.fit.point, {n: v * less for n, v in slips.items()}) for less in LESS_SLIP
-    ]
-    fits = [fit(box, start, now.fit.coordinates, now.fit.tied, rough=True) for start in starts]
-    best = max(fits, key=lambda each: each.value)
-    return replace(now, box=box, fit=fit(box, best.point, best.coordinates, best.tied))
+    made = precise_fit(trials, now.box, start, now.fit.coordinates, now.fit.tied)
+    best = max(made, now, key=lambda each: each.fit.value)
+    return replace(now, box=best.box, fit=best.fit)

@@ -20,6 +20,9 @@ WIDE = 5.0
 In those that the parameters' list has (10 % of them).
 """
 
+SHOWN = 0.01
+"""Least presliding distance, in standard deviations of a reading of the position."""
+
 
 def slot(path: str) -> str:
     """`effect.parameter` of a path."""
@@ -100,12 +103,15 @@ def own_coordinates(box: GreyBox) -> tuple[list[Coordinate], dict[str, str]]:
             Coordinate(name, scale, inertial, lower, upper, 1.0 if inertial else spread / scale)
         )
     for effect in model.effects.values():
-        coordinates += [presliding(effect.name)] if "presliding" in effect.scanned else []
+        coordinates += [presliding(effect.name, box)] if "presliding" in effect.scanned else []
     return coordinates, tied
 
 
-def presliding(effect: str) -> Coordinate:
-    """How far a contact gives before it slides, which no list of parameters has free."""
+def presliding(effect: str, box: GreyBox) -> Coordinate:
+    """How far a contact gives before it slides, which no list of parameters has free.
+
+    No less than what readings of a position can show.
+    """
     quantity = quantity_of(f"{effect}.presliding")
     low, high = quantity.to_si(quantity.lower), quantity.to_si(quantity.upper)
-    return Coordinate(f"{effect}.presliding", 1.0, True, low, high, 2.0)
+    return Coordinate(f"{effect}.presliding", 1.0, True, max(low, SHOWN * box.finest), high, 2.0)

@@ -22,9 +22,11 @@ from pma_gym.discovery.grey_box.latent_law import (
     latent_line,
     line_over_position,
 )
+from pma_gym.discovery.grey_box.prepared_trials import PreparedTrials
 from pma_gym.effects import CATALOGUE
 from pma_gym.effects.user_effects import load_effects
 from pma_gym.estimation.innovations import Point
+from pma_gym.estimation.logged import Logged
 from pma_gym.estimation.smoother import Smoothed, smoothed
 from pma_gym.plant.model import Model
 from tests.estimation.linear_slide import box
@@ -99,7 +101,7 @@ def model(plant, inertia=1.05, presliding=None):
                 "slope_n_s_per_mm_per_kpa": 0.0,
             },
             "start": {"contraction_mm": 0.0, "velocity_mm_per_s": 0.0},
-            "lvdt": {"bandwidth_hz": 1000.0, "noise_mm": 0.01},
+            "lvdt": {"bandwidth_hz": 1e4, "noise_mm": 0.01},
         }
         friction = {
             "static_n": dry,
@@ -113,7 +115,7 @@ def model(plant, inertia=1.05, presliding=None):
             "inertia": {"inertia_kg_m2": inertia * mass},
             "joint_damping": {"coefficient_n_m_s": damping},
             "joint_start": {"angle_deg": 0.0, "spin_deg_per_s": 0.0},
-            "encoder": {"bandwidth_hz": 1000.0, "noise_deg": 0.01},
+            "encoder": {"bandwidth_hz": 1e4, "noise_deg": 0.01},
         }
         friction = {
             "static_n_m": dry,
@@ -181,7 +183,7 @@ def test_a_drive_that_weakens_from_trial_to_trial_is_said_with_its_size():
     for force, share in zip(forces, (-0.02, 0.0, 0.02), strict=True):
         load = 100.0 * (force.over["motor voltage (V)"] - 5.0)
         assert np.polyfit(load, force.before, 1)[0] == pytest.approx(share, abs=0.003)
-        assert np.std(force.after) < 0.002 * np.std(load)
+        assert np.std(force.after) < 0.001 * np.std(load)
 
 
 @pytest.mark.campaign
@@ -262,6 +264,20 @@ def test_the_latent_force_beside_a_friction_that_hardly_gives_is_small(preslidin
         assert np.abs(smooth.position - trial.measurements[reading]).max() < 5.0 * noise
 
 
+@pytest.mark.parametrize("presliding_um", [1.0, 0.2])
+def test_what_slides_takes_no_short_steps_however_little_friction_gives(presliding_um):
+    *_, noise, _, _ = RIGS["slide"]
+    known = model("slide", inertia=1.0, presliding=presliding_um)
+    logged = [Logged.of(known, i, each) for i, each in enumerate(logs("slide", 2.0))]
+    prepared = PreparedTrials(known, logged, 1)
+    numbers = prepared.box(known).numbers()
+    right = Point(numbers, (noise,), (1e-2,) * 3, 0.06)
+    # A row is 10 ms.
+    assert prepared.precise(known, right).rows[0].steps <= 16
+    white = prepared.white(prepared.box(known, steps=16), [right])
+    assert np.mean(white**2) == pytest.approx(1.0, abs=0.2)
+
+
 @pytest.mark.campaign
 def test_an_axis_that_turns_1300_times_lacks_friction_or_a_constant_torque():
     tables = {
@@ -269,7 +285,7 @@ def test_an_axis_that_turns_1300_times_lacks_friction_or_a_constant_torque():
         "joint_damping": {"coefficient_n_m_s": 7.03e-5},
         "inertia": {"inertia_kg_m2": 1.2e-4},
         "joint_start": {"angle_deg": 0.0, "spin_deg_per_s": 0.0},
-        "encoder": {"bandwidth_hz": 1000.0, "noise_deg": 0.012},
+        "encoder": {"bandwidth_hz": 1e4, "noise_deg": 0.012},
     }
     free = Model("axis", "axis", "joint", {n: CATALOGUE[n].parse(t) for n, t in tables.items()})
     dry = {
