@@ -27,6 +27,9 @@ FITTED, FURTHER = 1, 2
 AMOUNTS = (-0.5, -0.3, 0.0, 0.3, 0.6, 1.0, 1.5, 2.0, 3.0)
 """By how many times itself a parameter of an odd trial may differ where its fits begin."""
 
+PROMISED = (0.0, 0.5, 1.0, 2.0)
+"""Times what the screening promises that a parameter differs by trial where its fits begin."""
+
 MOST_FACTOR = 5.0
 """Factor that a parameter of one trial may differ by.
 
@@ -137,18 +140,20 @@ def _varied(trials: PreparedTrials, now: Hypothesis, move: Move, careful: bool) 
     tied |= {f"{tied_slot}{mark}{number}": name for tied_slot in tied_slots}
     coordinates = [*now.fit.coordinates, Coordinate(name, scale, False, *bounds)]
     starts = [weaker(trials, with_values(now.fit.point, with_tied({name: first}, tied)), 0.5)]
+    # The likeliest of what it may be beside a share of the latent force.
+    differ = [first + times * move.amount * scale for times in PROMISED]
     if odd and mark == TRIAL:
-        # Where it differs much, the likeliest of what it may be beside a share of its latent force.
-        here = [
-            replace(
-                with_values(now.fit.point, with_tied({name: there}, tied)),
-                forces=tuple(share * force for force in now.fit.point.forces),
-            )
-            for there in np.clip(value + np.array(AMOUNTS) * abs(value), *bounds).tolist()
-            for share in (1.0, *LESS)
-        ]
-        likely = log_likelihood(now.box.innovations(here), now.box.rows)
-        starts += [here[i] for i in np.argsort(-likely)[: 1 + careful]]
+        differ += [value + times * abs(value) for times in AMOUNTS]
+    here = [
+        replace(
+            with_values(now.fit.point, with_tied({name: there}, tied)),
+            forces=tuple(share * force for force in now.fit.point.forces),
+        )
+        for there in np.clip(differ, *bounds).tolist()
+        for share in (1.0, *LESS)
+    ]
+    likely = log_likelihood(now.box.innovations(here), now.box.rows)
+    starts += [here[i] for i in np.argsort(-likely)[: 1 + careful]]
     fits = [
         precise_fit(trials, now.box, start, coordinates, tied, rough=not careful)
         for start in starts

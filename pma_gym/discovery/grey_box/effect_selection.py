@@ -17,6 +17,7 @@ from pma_gym.discovery.grey_box.refined_fits import (
     other_hold,
     refined,
     trend_instead,
+    without,
 )
 from pma_gym.discovery.grey_box.slots import own_coordinates
 from pma_gym.discovery.grey_box.thresholds import LIKE, MATERIAL
@@ -127,7 +128,17 @@ class EffectSelection:
             beam = [best]
             if self.trials.is_bent(best[-1].fit.point, MATERIAL):
                 beam += [c for c in chains[1:BEAM] if self._lead(c, c[:-1]) > 0.0]
-        return best
+        return self._pruned(best)
+
+    def _pruned(self, chain: list[Hypothesis]) -> list[Hypothesis]:
+        """A chain without what is no longer worth its price beside what was added later."""
+        last = chain[-1]
+        for move in last.moves[:-1]:
+            less = without(self.trials, chain[0], last, move)
+            if less.fit.value > last.fit.value - self.price(last, less) - LIKE:
+                kept = [each for each in chain[:-1] if move not in each.moves]
+                return self._pruned([*kept, less] if less.moves else kept)
+        return chain
 
     def _extended(
         self, screening: Screening, beam: Sequence[list[Hypothesis]], step: str

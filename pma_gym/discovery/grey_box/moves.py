@@ -175,8 +175,9 @@ def _by_trial(
             change = beyond(column)
             square = float(change @ change)
             if square > NOTHING:
-                promise = 0.5 * float(left @ change) ** 2 / square
-                moves.append(Move(name, promise, 1, slots=(name,)))
+                amount = -float(left @ change) / square
+                promise = 0.5 * amount**2 * square
+                moves.append(Move(name, promise, 1, amount=amount, slots=(name,)))
     return moves
 
 

@@ -7,13 +7,13 @@ import numpy as np
 
 from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
 from pma_gym.discovery.grey_box.effect_fits import tried, weaker
-from pma_gym.discovery.grey_box.first_fit import hold_fits
+from pma_gym.discovery.grey_box.first_fit import SHARES, hold_fits
 from pma_gym.discovery.grey_box.hypothesis import Hypothesis, Move, precise_fit
 from pma_gym.discovery.grey_box.prepared_trials import PreparedTrials
 from pma_gym.discovery.grey_box.slots import quantity_of, slot, values_of
 from pma_gym.discovery.grey_box.thresholds import LIKE, LINE
 from pma_gym.effects import CATALOGUE
-from pma_gym.estimation.innovations import TREND, TRIAL, value_in_trial
+from pma_gym.estimation.innovations import TREND, TRIAL, log_likelihood, value_in_trial
 from pma_gym.estimation.likelihood_fit import Coordinate, value_of, with_tied, with_values
 
 WIDER = (1.0, 0.2, 5.0)
@@ -101,6 +101,39 @@ def trend_instead(trials: PreparedTrials, now: Hypothesis) -> Hypothesis:
             move = Move(f"{base}{TREND}", 0.0, 1, slots=(f"{base}{TREND}",))
             now = tried(trials, Hypothesis(now.box, less, kept, now.rivals), move, careful=True)
     return now
+
+
+def without(trials: PreparedTrials, base: Hypothesis, now: Hypothesis, gone: Move) -> Hypothesis:
+    """A hypothesis without a move and what needs it, fitted from where it ended with it."""
+    effect = f"{gone.candidate.effect}." if gone.candidate else "\0"
+    stay = [
+        move is not gone and not any(name.startswith(effect) for name in move.slots)
+        for move in now.moves
+    ]
+    moves = tuple(move for move, stays in zip(now.moves, stay, strict=True) if stays)
+    model = base.box.model
+    for move in moves:
+        model = move.candidate.beside(model) if move.candidate else model
+
+    def stays(name: str) -> bool:
+        return not name.startswith(effect) and name not in gone.slots
+
+    point, made = now.fit.point, now.fit
+    numbers = {name: value for name, value in point.numbers.items() if stays(name)}
+    tied = {name: of for name, of in made.tied.items() if stays(name) and stays(of)}
+    numbers = {name: v for name, v in numbers.items() if name not in made.tied or name in tied}
+    free = [c for c in made.coordinates if stays(c.name)]
+    box = trials.box(model)
+    start = replace(point, numbers={**box.numbers(), **numbers})
+    starts = [
+        replace(start, forces=tuple(max(share * trials.force, each) for each in point.forces))
+        for share in (0.0, *SHARES)
+    ]
+    box = trials.precise(model, start, now.box.rows[0].steps)
+    likely = log_likelihood(box.innovations(starts), box.rows)
+    less = precise_fit(trials, box, starts[int(np.argmax(likely))], free, tied)
+    rivals = [rival for rival, stays in zip(now.rivals, stay, strict=False) if stays]
+    return replace(less, moves=moves, rivals=tuple(rivals), alike=now.alike if stay[-1] else ())
 
 
 def again(trials: PreparedTrials, now: Hypothesis, larger: Hypothesis) -> Hypothesis:

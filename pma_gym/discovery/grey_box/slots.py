@@ -20,7 +20,7 @@ WIDE = 5.0
 In those that the parameters' list has (10 % of them).
 """
 
-SHOWN = 0.01
+SHOWN = 1e-3
 """Least presliding distance, in standard deviations of a reading of the position."""
 
 
