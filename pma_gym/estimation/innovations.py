@@ -340,11 +340,6 @@ class GreyBox:
         self.kernel = kernel(model, channels)
         self.order: Array = np.arange(float(len(rows))) - 0.5 * (len(rows) - 1)
 
-    @property
-    def is_rugged(self) -> bool:
-        """Whether the likelihood is: with dry friction, or another law of the way."""
-        return any(effect.rate_independent_law for effect in self.model.effects.values())
-
     def numbers(self) -> dict[str, float]:
         """The model's own parameters (SI) by slot."""
         return dict(zip(parameter_names(self.model), self.model.vector().tolist(), strict=True))
@@ -562,6 +557,11 @@ def predictions(box: GreyBox, point: Point, horizon: float) -> list[Array]:
         np.where((number == 0)[:, None], np.nan, np.where(window[:, None], late, early))
         for number, window, early, late in zip(numbers, windows, *expected, strict=True)
     ]
+
+
+def is_rough(model: Model) -> bool:
+    """Whether a model has dry friction, or another law of the way: its likelihood jumps."""
+    return any(effect.rate_independent_law for effect in model.effects.values())
 
 
 def value_in_trial(point: Point, slot: str, number: int, order: Array) -> float:

@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from pma_gym.estimation.innovations import GreyBox, Point, log_likelihood
+from pma_gym.estimation.innovations import GreyBox, Point, is_rough, log_likelihood
 
 Array = NDArray[np.float64]
 
@@ -189,7 +189,7 @@ def fit(
     x, damping, p = within(origin), 1e-3, len(coordinates)
     best = float(valued([x])[0][0])
     information, scores = np.eye(p), np.zeros((BLOCKS, p))
-    sizes = [*(WIDE_STEPS if box.is_rugged and not near else ()), STEP]
+    sizes = [*(WIDE_STEPS if is_rough(box.model) and not near else ()), STEP]
     # A start whose filter fails has no slopes to go by: it is less likely than any other.
     for _ in range(most if np.isfinite(best) else 0):
         size = sizes[0]

@@ -7,8 +7,8 @@ Between two rows mean and covariance move together in short steps of the Rosenbr
     = 1 - 1/sqrt(2)
 
 Dry friction is the bristle of the catalogue: while it sticks it is a stiff spring, which takes the
-variance of the speed away by itself. At a row the readings correct mean and covariance one after
-the other.
+variance of the speed away by itself. J has its slope over the way of the step. At a row the
+readings correct mean and covariance one after the other.
 
 Source:
     J. G. Verwer, E. J. Spee, J. G. Blom, W. Hundsdorfer 1999, "A second-order Rosenbrock method

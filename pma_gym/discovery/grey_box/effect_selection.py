@@ -11,7 +11,7 @@ from pma_gym.discovery.grey_box.effect_fits import tried
 from pma_gym.discovery.grey_box.first_fit import first_fit, unmoved
 from pma_gym.discovery.grey_box.hypothesis import Hypothesis, Move
 from pma_gym.discovery.grey_box.moves import Screening
-from pma_gym.discovery.grey_box.prepared_trials import PreparedTrials, is_rough
+from pma_gym.discovery.grey_box.prepared_trials import PreparedTrials
 from pma_gym.discovery.grey_box.refined_fits import (
     again,
     other_hold,
@@ -23,7 +23,7 @@ from pma_gym.discovery.grey_box.slots import own_coordinates
 from pma_gym.discovery.grey_box.thresholds import LIKE, MATERIAL
 from pma_gym.discovery.thresholds import CONFIDENCE, LEFT, MOST_EFFECTS
 from pma_gym.effects import CATALOGUE
-from pma_gym.estimation.innovations import TREND, TRIAL
+from pma_gym.estimation.innovations import TREND, TRIAL, is_rough
 from pma_gym.estimation.likelihood_fit import BLOCKS, value_of
 
 Array = NDArray[np.float64]

@@ -7,10 +7,10 @@ import numpy as np
 
 from pma_gym.discovery.grey_box.hypothesis import Hypothesis, precise_fit
 from pma_gym.discovery.grey_box.kept_fits import fit
-from pma_gym.discovery.grey_box.prepared_trials import PreparedTrials, is_rough
+from pma_gym.discovery.grey_box.prepared_trials import PreparedTrials
 from pma_gym.discovery.grey_box.slots import own_coordinates
 from pma_gym.discovery.grey_box.thresholds import LEAST_TRIALS, ODD
-from pma_gym.estimation.innovations import GreyBox, Point, log_likelihood
+from pma_gym.estimation.innovations import GreyBox, Point, is_rough, log_likelihood
 from pma_gym.estimation.likelihood_fit import Coordinate, value_of, with_tied, with_values
 
 STARTS, SMOOTH_STARTS = 5, 3

@@ -26,13 +26,22 @@ from pma_gym.discovery.experiments.predicted_trials import proposal
 from pma_gym.discovery.grey_box.conclusions import Conclusions
 from pma_gym.discovery.grey_box.effect_fits import tried
 from pma_gym.discovery.grey_box.hypothesis import Hypothesis
-from pma_gym.discovery.grey_box.prepared_trials import PreparedTrials, is_rough
+from pma_gym.discovery.grey_box.prepared_trials import PreparedTrials
 from pma_gym.discovery.grey_box.thresholds import LIKE
 from pma_gym.discovery.report.effect_text import effect_names
 from pma_gym.discovery.report.figure_text import figure, signal_name
 from pma_gym.discovery.result.next_experiment import NextExperiment
 from pma_gym.discovery.thresholds import RESOLVED, SETTLED
-from pma_gym.estimation.innovations import TREND, TRIAL, TURNS, GreyBox, Point, Rows, counted
+from pma_gym.estimation.innovations import (
+    TREND,
+    TRIAL,
+    TURNS,
+    GreyBox,
+    Point,
+    Rows,
+    counted,
+    is_rough,
+)
 from pma_gym.estimation.likelihood_fit import STEP, with_tied, with_values
 from pma_gym.estimation.logged import Logged
 from pma_gym.plant.sensors import direct_command

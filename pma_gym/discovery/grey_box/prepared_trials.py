@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from pma_gym.discovery.grey_box.thresholds import FAINT, LOUD, STEP_MISS, STEP_SHARE
 from pma_gym.effects.effect import signals
-from pma_gym.estimation.innovations import GreyBox, Point, Rows
+from pma_gym.estimation.innovations import GreyBox, Point, Rows, is_rough
 from pma_gym.estimation.likelihood_fit import Coordinate
 from pma_gym.estimation.logged import Logged
 from pma_gym.plant.model import Model
@@ -195,11 +195,6 @@ class PreparedTrials:
         """Whether a latent force, or more noise than the readings show, stands in for something."""
         noisy = [d > LOUD * n for d, n in zip(point.deviations, self.noise, strict=True)]
         return max(point.forces) > share * self.force or any(noisy)
-
-
-def is_rough(model: Model) -> bool:
-    """Whether a model has dry friction, or another law of the way."""
-    return any(effect.rate_independent_law for effect in model.effects.values())
 
 
 def reading_step(rows: Sequence[Array]) -> float:

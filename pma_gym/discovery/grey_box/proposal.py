@@ -15,7 +15,7 @@ from pma_gym.discovery.grey_box.kept_fits import fit
 from pma_gym.discovery.grey_box.predictions import Predictions
 from pma_gym.discovery.grey_box.prepared_trials import FINAL, LEAST_FORCE
 from pma_gym.discovery.grey_box.slots import gains_of_drive, quantity_of, slot
-from pma_gym.discovery.grey_box.thresholds import FAR, LIKE, MATERIAL, NOISES, SMALL
+from pma_gym.discovery.grey_box.thresholds import FAR, LIKE, NOISES, SMALL
 from pma_gym.discovery.result.misfit import rms
 from pma_gym.discovery.thresholds import COMPLETE, SURE
 from pma_gym.estimation.likelihood_fit import value_of, with_tied, with_values
@@ -130,7 +130,7 @@ class Proposal:
             self.selection.trials.span / self.selection.trials.stride / self.selection.trials.block
         )
         # How an incomplete model's commands run between rows is not known to less than a row.
-        unknown = row * (MATERIAL if self.predictions.misfit(last) < COMPLETE else 1.0)
+        unknown = 0.0 if self.predictions.misfit(last) < COMPLETE else row
         if late < max(unknown, SURE * error):
             return 0.0
         price = np.log(len(self.candidates)) + last.price_of(1)

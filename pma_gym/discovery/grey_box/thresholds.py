@@ -8,7 +8,7 @@ MATERIAL = 0.02
 """Share of the drive's force (root mean square) above which a latent force matters.
 
 Assumption, what the force constant of a drive is known to. A latent force below it is `agrees` or
-`parameters`, however significant. So are trials that differ by less, and a delay of less of a row.
+`parameters`, however significant. So are trials that differ by less.
 """
 
 LIKE = 3.0
