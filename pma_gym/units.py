@@ -169,7 +169,10 @@ class Quantity:
         return value * self.factor
 
     def from_si(self, value: float) -> float:
-        """Convert a value from SI to the file unit."""
+        """Convert a value from SI to the file unit; a bound comes back as itself."""
+        for end in (self.lower, self.upper):
+            if value == self.to_si(end):
+                return float(end)
         return value / self.factor
 
     def check(self, name: str, value: float) -> None:

@@ -485,3 +485,10 @@ def test_a_law_is_refused_on_a_rig_without_its_signals(write, station):
     station.model.with_effects(["drag"])
     with pytest.raises(ModelError, match=r"cannot know contraction; at port slide_force of a sl"):
         load_model(MODELS["slide"]).with_effects(["drag"])
+
+
+def test_a_bound_comes_back_from_si_as_itself():
+    for effect in CATALOGUE.values():
+        for quantity in effect.quantities.values():
+            for end in (quantity.lower, quantity.upper):
+                assert quantity.from_si(quantity.to_si(end)) == end

@@ -285,7 +285,7 @@ def test_an_axis_that_turns_1300_times_lacks_friction_or_a_constant_torque():
         "joint_damping": {"coefficient_n_m_s": 7.03e-5},
         "inertia": {"inertia_kg_m2": 1.2e-4},
         "joint_start": {"angle_deg": 0.0, "spin_deg_per_s": 0.0},
-        "encoder": {"bandwidth_hz": 1e4, "noise_deg": 0.012},
+        "encoder": {"bandwidth_hz": 1000.0, "noise_deg": 0.012},
     }
     free = Model("axis", "axis", "joint", {n: CATALOGUE[n].parse(t) for n, t in tables.items()})
     dry = {
