@@ -87,6 +87,7 @@ from pma_gym.effects.residual_law import (
 from pma_gym.effects.rig_ports import SECOND_PORTS
 from pma_gym.effects.sensors.bent_sensor import BENT_SENSORS
 from pma_gym.effects.sensors.potentiometer_backlash import POTENTIOMETER_BACKLASH
+from pma_gym.effects.sensors.sensor_backlash import SENSOR_BACKLASHES
 from pma_gym.effects.sensors.sensor_delay import SENSOR_DELAYS
 from pma_gym.effects.sensors.sensor_errors import (
     FORCE_SENSOR_ERROR,
@@ -201,6 +202,7 @@ CATALOGUE: dict[str, Effect] = {
         FORCE_SENSOR_ERROR,
         *SENSOR_DELAYS,
         *BENT_SENSORS,
+        *SENSOR_BACKLASHES,
         *STOP_OPERATORS,
         PULLEY,
         LEVER,

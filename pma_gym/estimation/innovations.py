@@ -137,6 +137,7 @@ class Point:
         forces: standard deviation of the latent force in each trial (N, N m).
         memory: how long it remembers (s).
         delay: of the command (s).
+        clock: share by which the readings' clock runs fast beside that of the commands.
     """
 
     numbers: Mapping[str, float]
@@ -144,6 +145,12 @@ class Point:
     forces: tuple[float, ...]
     memory: float
     delay: float = 0.0
+    clock: float = 0.0
+
+    @property
+    def pace(self) -> float:
+        """Time of the commands in one second of the readings' clock (s)."""
+        return 1.0 / (1.0 + self.clock)
 
 
 class Rows:
@@ -226,27 +233,33 @@ class Rows:
     def _stepped(self, firsts: NDArray[np.int64], edges: Array) -> None:
         """Take steps: numbers of the first that lead to each row, and the times between them."""
         self.firsts, self._edges, self.lengths = firsts, edges, np.diff(edges)
-        self._known: dict[float, Array] = {}
+        self._known: dict[tuple[float, float], Array] = {}
 
     @property
     def first(self) -> float:
         """Command in the first row."""
         return float(self._motor[0])
 
-    def commands(self, delay: float) -> Array:
-        """Mean command over each step, late by a delay; shape (steps of all rows,)."""
-        known = self._known.get(delay)
+    def commands(self, delay: float, pace: float = 1.0) -> Array:
+        """Mean command over each step, shape (steps of all rows,).
+
+        Late by a delay (s), and by what a clock of another pace has gained since the first row.
+        """
+        known = self._known.get((delay, pace))
         if known is None:
-            known = np.diff(self._integral(self._edges - delay)) / self.lengths
+            known = self._means(self._edges, delay, pace)
             if len(self._known) > MOST_KEPT:
                 self._known.clear()
-            self._known[delay] = known
+            self._known[delay, pace] = known
         return known
 
-    def mean_commands(self, delay: float) -> Array:
-        """Mean command between each row and the one before it, late by a delay; shape (rows,)."""
-        means = np.diff(self._integral(self.time - delay)) / np.diff(self.time)
-        return np.append(self.first, means)
+    def mean_commands(self, delay: float, pace: float = 1.0) -> Array:
+        """The same between each row and the one before it, shape (rows,)."""
+        return np.append(self.first, self._means(self.time, delay, pace))
+
+    def _means(self, edges: Array, delay: float, pace: float) -> Array:
+        at = self._at[0] + pace * (edges - self._at[0]) - delay
+        return np.diff(self._integral(at)) / np.diff(at)
 
     def _integral(self, at: Array) -> Array:
         """Integral of the command up to given times; before the first row it is as there."""
@@ -359,10 +372,9 @@ class GreyBox:
             filled = some + [some[-1]] * (width - len(some))
             trial = trials[number]
             arguments = self._arguments(self.kernel, number, trial, filled)
-            delays = [point.delay for point in filled]
-            out = self._run(self.kernel, trial, delays, arguments)
+            out = self._run(self.kernel, trial, filled, arguments)
             if trial.finer is not None:
-                out = _extrapolated(out, self._run(self.kernel, trial.finer, delays, arguments))
+                out = _extrapolated(out, self._run(self.kernel, trial.finer, filled, arguments))
             for i, into in enumerate(results[number]):
                 into[first : first + width] = np.moveaxis(out[:, :, i, : len(some)], -1, 0)
 
@@ -376,7 +388,7 @@ class GreyBox:
         k = kernel(self.model, self.channels, keeps=True)
         n, s, trial = len(k.states), k.size, self.rows[number].finer or self.rows[number]
         room = np.empty((len(trial.time), 2 * s + n * n))
-        self._run(k, trial, [point.delay], self._arguments(k, number, trial, [point]), room)
+        self._run(k, trial, [point], self._arguments(k, number, trial, [point]), room)
         lower = np.tril_indices(n)
 
         def full(flat: Array) -> Array:
@@ -406,12 +418,12 @@ class GreyBox:
         self,
         k: Kernel,
         trial: Rows,
-        delays: Sequence[float],
+        points: Sequence[Point],
         arguments: tuple[Array, Array],
         kept: Array | None = None,
     ) -> Array:
-        commands = np.array([trial.commands(delay) for delay in delays]).T
-        out = np.empty((len(trial.time), len(self.channels), 2, len(delays)))
+        commands = np.array([trial.commands(p.delay, p.pace) for p in points]).T
+        out = np.empty((len(trial.time), len(self.channels), 2, len(points)))
         arrays = [
             np.ascontiguousarray(a)
             for a in (trial.firsts, trial.lengths, commands, trial.readings, *arguments)
@@ -424,6 +436,7 @@ class GreyBox:
         own = {
             f"{LATENT}.memory_time": point.memory,
             "process_noise": 2.0 * point.forces[number] ** 2 / point.memory,
+            "pace": point.pace,
         }
         own |= {f"variance {i}": value**2 for i, value in enumerate(point.deviations)}
         if not any(TRIAL in name or TREND in name for name in point.numbers):
@@ -499,7 +512,7 @@ class GreyBox:
             e.name: e.parameters(*(point.numbers[f"{e.name}.{stem}"] for stem in e.quantities))
             for e in mounts
         }
-        return float(mount_error(self.model, parameters, position, first))
+        return float(mount_error(self.model, parameters, position, first, lambda _: 1.0))
 
     def asked(self, command: float) -> float:
         """What the drive asks for at a command (N; else the command itself)."""
@@ -559,7 +572,7 @@ def predictions(box: GreyBox, point: Point, horizon: float) -> list[Array]:
     ]
 
 
-def is_rough(model: Model) -> bool:
+def is_rugged(model: Model) -> bool:
     """Whether a model has dry friction, or another law of the way: its likelihood jumps."""
     return any(effect.rate_independent_law for effect in model.effects.values())
 

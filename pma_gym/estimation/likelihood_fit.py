@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from pma_gym.estimation.innovations import GreyBox, Point, is_rough, log_likelihood
+from pma_gym.estimation.innovations import GreyBox, Point, is_rugged, log_likelihood
 
 Array = NDArray[np.float64]
 
@@ -26,6 +26,9 @@ WIDE_STEPS = 3e-2, 3e-3
 Where friction turns a row earlier or later the likelihood jumps, and a short step sees no slope but
 that of a jump.
 """
+
+RUNAWAY = 1e100
+"""Slope of an innovation from which on the filter beside the point has run away and tells none."""
 
 MOST_ITERATIONS, LEAST_GAIN = 40, 0.05
 """Of a fit; it ends where an iteration gains less."""
@@ -42,7 +45,7 @@ WIDEST = 3.0
 BLOCKS = 60
 """Pieces of all readings whose scores are taken as independent of each other, for the intervals."""
 
-OTHERS = ("memory", "delay")
+OTHERS = ("memory", "delay", "clock")
 """Numbers of a point that are no parameters of its model."""
 
 
@@ -189,7 +192,7 @@ def fit(
     x, damping, p = within(origin), 1e-3, len(coordinates)
     best = float(valued([x])[0][0])
     information, scores = np.eye(p), np.zeros((BLOCKS, p))
-    sizes = [*(WIDE_STEPS if is_rough(box.model) and not near else ()), STEP]
+    sizes = [*(WIDE_STEPS if is_rugged(box.model) and not near else ()), STEP]
     # A start whose filter fails has no slopes to go by: it is less likely than any other.
     for _ in range(most if np.isfinite(best) else 0):
         size = sizes[0]
@@ -241,7 +244,7 @@ def _scored(
             root = np.sqrt(s[0])
             de = (e[1:] - e[0]) / (signs[:, None] * root)
             ds = (np.log(s[1:]) - np.log(s[0])) / signs[:, None]
-            bad = ~(np.isfinite(de) & np.isfinite(ds))
+            bad = ~((np.abs(de) < RUNAWAY) & np.isfinite(ds))
             slopes.append(np.where(bad, 0.0, np.stack([de, ds])))
             white = e[0] / root
             sizes.append(np.stack([white, 1.0 - white**2]))

@@ -59,7 +59,7 @@ def smoothed(box: GreyBox, point: Point, number: int) -> Smoothed:
     at = {name: i for i, name in enumerate(kept.states)}
     latent, position = at[f"memory_{LATENT}"], at[box.model.rig.signals[0].name]
     deviation = np.sqrt(np.maximum(spread[:, latent, latent], 0.0))
-    command = trial.mean_commands(point.delay)
+    command = trial.mean_commands(point.delay, point.pace)
     return Smoothed(
         trial.time,
         mean[:, latent],
@@ -72,6 +72,6 @@ def smoothed(box: GreyBox, point: Point, number: int) -> Smoothed:
 
 def _inverse(covariance: Array) -> Array:
     """Inverse within the directions that are uncertain, whatever the units of the states."""
-    spread = np.sqrt(np.diag(covariance))
+    spread = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     units = np.outer(spread, spread) + (np.outer(spread, spread) == 0.0)
     return np.linalg.pinv(covariance / units, rcond=SINGULAR, hermitian=True) / units

@@ -83,6 +83,7 @@ class FilterEquations:
             for j in range(i + 1)
         }
         self.length = graph.input("substep", CHANGING)
+        self.true_length = self.length * graph.input("pace", FIXED)
         self.drive = graph.input("process_noise", FIXED)
         self.variances = [graph.input(f"variance {i}", FIXED) for i in range(len(self.readings))]
         self.read = [graph.input(f"reading {i}", CHANGING) for i in range(len(self.readings))]
@@ -96,7 +97,7 @@ class FilterEquations:
         return self.covariance[max(i, j), min(i, j)]
 
     def _moved(self) -> tuple[list[Value], list[list[Entry]]]:
-        eq, h = self.eq, self.length
+        eq, h = self.eq, self.true_length
         frozen, here = step_start(eq)
         frozen = {**frozen, **_signs(eq, frozen)}
         own, memories = eq.states, eq.rate_independent_states
@@ -169,7 +170,7 @@ class FilterEquations:
         eq = self.eq
         assert eq.travel is not None and eq.travelled is not None
         way, speed = eq.travelled
-        expected, direction = self.length * speed, frozen[eq["direction"].id]
+        expected, direction = self.true_length * speed, frozen[eq["direction"].id]
         far = direction * expected > LEAST_WAY
         ahead = eq.graph.select(far, expected, LEAST_WAY * direction)
         there = substitute(rates, {**frozen, eq.travel.id: ahead})
@@ -188,7 +189,7 @@ class FilterEquations:
         n: int,
     ) -> list[Entry]:
         """What one unit of a state becomes of all states in the linearised step."""
-        h = self.length
+        h = self.true_length
 
         def right(vector: list[Entry]) -> list[Entry]:
             out: list[Entry] = []
@@ -217,7 +218,7 @@ class FilterEquations:
         n, zero = len(self.mean), self.eq.graph.constant(0.0)
         # Half of the noise before the step and half after it: of order 2, as the step is.
         added = {
-            (i, i): 0.5 * self.drive * self.length
+            (i, i): 0.5 * self.drive * self.true_length
             for i, state in enumerate(self.states)
             if state.name == self.noisy
         }

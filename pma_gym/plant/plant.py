@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pma_gym.data.trial import Trial
+from pma_gym.effects.effect import Effect
 from pma_gym.integrator.equations import Interpolation, check_interpolation
 from pma_gym.plant import sensors
 from pma_gym.plant.compiled_model import CompiledModel
@@ -177,10 +178,17 @@ class Plant(CompiledModel):
 
     def lagged(self, states: np.ndarray, truth: Mapping[str, np.ndarray]) -> np.ndarray:
         """Sensor outputs before noise, (rows, signals): the lag's state, or the mounted value."""
+
+        def memory(effect: Effect) -> np.ndarray:
+            (name,) = effect.memory_names
+            return states[:, self.states.index(name)]
+
+        def mounted(name: str) -> np.ndarray:
+            known = self.model, self.parameters, name, truth[name], memory
+            return truth[name] + sensors.mount_error(*known)
+
         columns = [
-            states[:, at]
-            if at >= 0
-            else truth[name] + sensors.mount_error(self.model, self.parameters, name, truth[name])
+            states[:, at] if at >= 0 else mounted(name)
             for at, name in zip(self.sensor_columns, self.outputs, strict=True)
         ]
         return np.stack(columns, axis=1)

@@ -1,6 +1,6 @@
 """Measurements of the DAQ: lagged signals plus noise, through the calibrations, quantised."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,7 +11,7 @@ from pma_gym.data.signals import SIGNALS, Signal
 from pma_gym.data.trial import Trial
 from pma_gym.data.trial_columns import BY_QUANTITY, VOLTAGE_RANGE, SampleError, TrialError
 from pma_gym.effects.contact.imposed_motion import following_rate
-from pma_gym.effects.effect import Parameters
+from pma_gym.effects.effect import Effect, Parameters, signals
 from pma_gym.effects.ports import MOUNT
 from pma_gym.plant.imposed_motion import level_command, motion_command
 from pma_gym.plant.model import Model
@@ -104,6 +104,7 @@ def mount_error(
     parameters: Mapping[str, Parameters],
     output: str,
     truth: Any,  # noqa: ANN401
+    memory: Callable[[Effect], Any],
 ) -> Any:  # noqa: ANN401
     """What the mount of an output's sensor adds to the true value (SI), a number or an array.
 
@@ -112,9 +113,15 @@ def mount_error(
         parameters: of the effects at the mount (SI), by name.
         output: the output's name.
         truth: its value (SI), a number or an array.
+        memory: of an effect that has one.
     """
-    mounts = [e for e in model.effects.values() if e.port == f"{MOUNT}{output}" and e.law]
-    return sum((each.law(truth, parameters[each.name]) for each in mounts if each.law), 0.0)
+    added = 0.0
+    for each in model.effects.values():
+        if each.port == f"{MOUNT}{output}" and each.law:
+            known = {"signal": truth, "p": parameters[each.name]}
+            known |= {"memory": memory(each)} if each.memory_names else {}
+            added = added + each.law(*(known[name] for name in signals(each.law)))
+    return added
 
 
 def measure(

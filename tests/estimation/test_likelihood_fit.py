@@ -82,6 +82,17 @@ def test_scores_of_all_blocks_sum_to_the_gradient_of_the_log_likelihood(linear):
     assert np.abs(gradient).min() > 1.0
 
 
+def test_a_filter_that_runs_away_beside_a_point_tells_no_slope(linear):
+    """Readings that it throws out to 1e200 leave an information that is finite."""
+    away = with_values(point(linear), WRONG)
+    beside = [with_values(away, {c.name: c.value(c.of(away) + 1e-4)}) for c in ALL]
+    ((errors, spreads),) = linear.innovations([away, *beside])
+    errors[1, 40:] = 1e200
+    information, scores = _scored(linear, [(errors, spreads)], np.full(len(ALL), 1e-4))
+    assert np.isfinite(information).all() and np.isfinite(scores).all()
+    assert np.diag(information)[1:].min() > 0.0
+
+
 @pytest.mark.parametrize("force", [1e-6, 1e-4, 1e-2])
 def test_a_size_that_is_none_holds_no_other_number_back(force):
     """Its own step is of any length; with the whole step shortened by it a fit lost 300 of 4396."""

@@ -1,4 +1,4 @@
-"""What the filter makes of readings that are wrong."""
+"""What the filter makes of bent sensors, play before a sensor and clocks that disagree."""
 
 from dataclasses import replace
 
@@ -12,6 +12,7 @@ from tests.estimation.linear_slide import NOISES, box, logged, point, slide
 
 MOUNTS = {
     "lvdt_bend": {"curvature_percent_per_mm": 0.0},
+    "lvdt_backlash": {"width_mm": 0.0},
 }
 
 
@@ -25,7 +26,7 @@ def test_an_absent_mount_leaves_innovations_but_for_rounding(name):
         np.testing.assert_allclose(one, other, rtol=1e-9, atol=1e-9 * NOISES[0])
 
 
-SIZES = {"lvdt_bend.curvature": 0.2}
+SIZES = {"lvdt_bend.curvature": 0.2, "lvdt_backlash.width": 4e-4, "clock": 4e-3}
 
 
 @pytest.mark.parametrize("name", SIZES)
@@ -57,3 +58,12 @@ def test_a_bent_sensor_without_a_table_reads_the_square_of_the_position():
     truth, read = swung(lvdt_bend={"curvature_percent_per_mm": 1.0})
     np.testing.assert_allclose(read, truth + 10.0 * truth**2)
     assert np.abs(truth).max() > 0.01
+
+
+def test_a_gear_loses_half_its_play_each_way():
+    truth, read = swung(lvdt_backlash={"width_mm": 0.4})
+    place, expected = 0.0, []
+    for q in truth:
+        place = min(max(place, q - 2e-4), q + 2e-4)
+        expected.append(place)
+    np.testing.assert_allclose(read, expected, atol=2e-6)

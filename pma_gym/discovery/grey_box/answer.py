@@ -13,6 +13,7 @@ from pma_gym.discovery.fitting.journal import Journal
 from pma_gym.discovery.grey_box.conclusions import Conclusions
 from pma_gym.discovery.grey_box.effect_selection import EffectSelection
 from pma_gym.discovery.grey_box.first_fit import first_fit
+from pma_gym.discovery.grey_box.hum import without_hum
 from pma_gym.discovery.grey_box.kept_fits import kept_in
 from pma_gym.discovery.grey_box.latent_law import drafted_effect
 from pma_gym.discovery.grey_box.next_trial import next_trial
@@ -25,7 +26,7 @@ from pma_gym.discovery.grey_box.thresholds import MATERIAL
 from pma_gym.discovery.report.effect_text import effect_name
 from pma_gym.discovery.report.figure_text import figure, listed
 from pma_gym.discovery.result.estimates import Approximate, Covariance, RivalModel
-from pma_gym.discovery.result.noise import Floor
+from pma_gym.discovery.result.noise import Floor, Nuisance
 from pma_gym.estimation.innovations import TREND, TRIAL
 from pma_gym.estimation.likelihood_fit import Fit, value_of
 from pma_gym.estimation.logged import Logged
@@ -80,10 +81,28 @@ def diagnosis(conclusions: Conclusions, propose: bool) -> Diagnosis:
         if conclusions.verdict == "unknown" and conclusions.line
         else {},
         floors=floors,
+        nuisances=_hums(conclusions),
         states=conclusions.states,
         trials=conclusions.records,
         steps=_steps(conclusions),
         warnings=(*([WORSE] if conclusions.proposal.is_worse else []), *filter(None, [none_helps])),
+    )
+
+
+def _hums(conclusions: Conclusions) -> tuple[Nuisance, ...]:
+    """Hums of the sensors, in standard deviations of their noise."""
+    trials, noise = conclusions.selection.trials, conclusions.proposal.last.fit.point.deviations
+    return tuple(
+        Nuisance(
+            "line",
+            {
+                trials.model.rig.signals[hum.channel].column: hum.amplitude
+                / 2.0**0.5
+                / noise[trials.channels.index(hum.channel)]
+            },
+            hum.hertz,
+        )
+        for hum in trials.hums
     )
 
 
@@ -185,7 +204,7 @@ def answered(
         TrialError: trials with fewer readings than a fit needs.
     """
     logged = [Logged.of(model, i, each.trial) for i, each in enumerate(named)]
-    trials = PreparedTrials(model, logged, threads)
+    trials = without_hum(PreparedTrials(model, logged, threads))
     selection = EffectSelection(trials, candidates or (), seed, tell)
     limits = {
         BY_QUANTITY[name].name: value / SI_FACTORS[BY_QUANTITY[name].unit]

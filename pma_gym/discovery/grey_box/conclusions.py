@@ -55,12 +55,12 @@ class Conclusions:
         proposal, last = self.proposal, self.proposal.last
         effects = proposal.delayed or any(move.candidate for move in last.moves)
         material = proposal.share(last) > MATERIAL and proposal.is_latent
-        if not last.moves and len(self.predictions.path) > 1 and proposal.is_latent:
-            return "unknown"
         incomplete = material or proposal.is_latent and self.predictions.misfit(last) > COMPLETE
-        if material and not last.moves:
-            return "unknown"
-        if last.moves and proposal.left > LEFT and incomplete:
+        if last.moves:
+            lacks = incomplete and proposal.left > LEFT
+        else:
+            lacks = material or incomplete and len(self.predictions.path) > 1
+        if lacks:
             return "unknown"
         if proposal.far:
             return "undecidable"
@@ -68,7 +68,8 @@ class Conclusions:
             return "effect"
         if not last.moves and self.predictions.misfit(last) > NOISES and proposal.is_latent:
             return "undecidable"
-        if self._within_tolerance() or not last.moves and not proposal.moved:
+        alike = all(move.is_nuisance for move in last.moves)
+        if self._within_tolerance() or alike and not proposal.moved:
             return "agrees"
         return "parameters"
 
@@ -200,7 +201,7 @@ class Conclusions:
             ):
                 values[path] = float(value) / SI_FACTORS[quantity_of(slot(path)).unit]
             for move in last.moves:
-                for name in move.slots:
+                for name in () if move.is_nuisance else move.slots:
                     base, _, number = (
                         name.partition(TRIAL) if TRIAL in name else name.partition(TREND)
                     )

@@ -7,7 +7,7 @@ import numpy as np
 
 from pma_gym.discovery.grey_box.first_fit import SHARES
 from pma_gym.discovery.grey_box.hypothesis import Hypothesis, Move, added_paths, precise_fit
-from pma_gym.discovery.grey_box.prepared_trials import PreparedTrials
+from pma_gym.discovery.grey_box.prepared_trials import CLOCK, PreparedTrials
 from pma_gym.discovery.grey_box.slots import presliding, quantity_of, slot, values_of
 from pma_gym.discovery.grey_box.thresholds import ODD
 from pma_gym.effects import CATALOGUE
@@ -30,6 +30,9 @@ AMOUNTS = (-0.5, -0.3, 0.0, 0.3, 0.6, 1.0, 1.5, 2.0, 3.0)
 PROMISED = (0.0, 0.5, 1.0, 2.0)
 """Times what the screening promises that a parameter differs by trial where its fits begin."""
 
+CLOCKS = (1e-4, 3e-4, 1e-3, 2e-3, 4e-3, 8e-3, 0.016, 0.03)
+"""Shares by which a clock runs fast or slow where its fits begin."""
+
 MOST_FACTOR = 5.0
 """Factor that a parameter of one trial may differ by.
 
@@ -40,6 +43,8 @@ Beyond it no cable chain jams, and another thing is missing.
 def tried(trials: PreparedTrials, now: Hypothesis, move: Move, careful: bool = False) -> Hypothesis:
     """Fit with a move added; `careful` from further starts."""
     candidate = move.candidate
+    if move.is_nuisance:
+        return _clocked(trials, now, move, careful)
     if candidate is None:
         return _varied(trials, now, move, careful)
     box = trials.box(candidate.beside(now.box.model), steps=now.box.rows[0].steps)
@@ -156,6 +161,35 @@ def _varied(trials: PreparedTrials, now: Hypothesis, move: Move, careful: bool) 
     starts += [here[i] for i in np.argsort(-likely)[: 1 + careful]]
     fits = [
         precise_fit(trials, now.box, start, coordinates, tied, rough=not careful)
+        for start in starts
+    ]
+    best = max(fits, key=lambda made: made.fit.value)
+    return replace(best, moves=(*now.moves, move), rivals=now.rivals)
+
+
+def _clocked(trials: PreparedTrials, now: Hypothesis, move: Move, careful: bool) -> Hypothesis:
+    """With the clock of the readings free; a careful fit has no further starts.
+
+    From the likeliest errors beside little latent force: what that makes up for shows no slope. And
+    beside the model's own parameters, for fitted ones may have made up for it too.
+    """
+    point, coordinates = now.fit.point, [*now.fit.coordinates, CLOCK]
+    own = with_values(point, with_tied({**point.numbers, **now.box.numbers()}, now.fit.tied))
+    own = replace(own, deviations=tuple(trials.noise), memory=trials.memory[0])
+    known = [(point, LESS[-1] * np.array(point.forces))]
+    known += [] if now.moves else [(own, np.full(len(point.forces), SHARES[0] * trials.force))]
+    starts = [weaker(trials, point, 0.5)]
+    for base, forces in known[: 0 if careful else None]:
+        here = [
+            replace(base, clock=way * error, delay=late * point.delay, forces=tuple(forces))
+            for error in CLOCKS
+            for way in (-1.0, 1.0)
+            for late in (1.0, 0.0)
+        ]
+        likely = log_likelihood(now.box.innovations(here), now.box.rows)
+        starts.append(here[int(np.argmax(likely))])
+    fits = [
+        precise_fit(trials, now.box, start, coordinates, now.fit.tied, rough=not careful)
         for start in starts
     ]
     best = max(fits, key=lambda made: made.fit.value)

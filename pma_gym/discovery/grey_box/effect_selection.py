@@ -23,7 +23,7 @@ from pma_gym.discovery.grey_box.slots import own_coordinates
 from pma_gym.discovery.grey_box.thresholds import LIKE, MATERIAL
 from pma_gym.discovery.thresholds import CONFIDENCE, LEFT, MOST_EFFECTS
 from pma_gym.effects import CATALOGUE
-from pma_gym.estimation.innovations import TREND, TRIAL, is_rough
+from pma_gym.estimation.innovations import TREND, TRIAL, is_rugged
 from pma_gym.estimation.likelihood_fit import BLOCKS, value_of
 
 Array = NDArray[np.float64]
@@ -161,8 +161,8 @@ class EffectSelection:
             self.tell(step, done, self.planned)
             larger = tried(self.trials, now, move)
             self.gains.setdefault(move.name, larger.fit.value - now.fit.value)
-            fits = _ends_within(larger) if move.candidate else is_carried(now, larger)
-            chains += [[*chain, larger]] if fits else []
+            carried = _ends_within(larger) if move.candidate else is_carried(now, larger)
+            chains += [[*chain, larger]] if move.is_nuisance or carried else []
         return sorted(chains, key=self._worth, reverse=True)
 
     def _keep(self, chains: Sequence[Sequence[Hypothesis]]) -> None:
@@ -206,8 +206,8 @@ class EffectSelection:
 
 def _cost(now: Hypothesis, move: Move) -> int:
     """How long a move's fits take, in those of one that needs no shorter steps."""
-    rougher = move.candidate and is_rough(move.candidate.beside(now.box.model))
-    return COST if rougher and not is_rough(now.box.model) else 1
+    rougher = move.candidate and is_rugged(move.candidate.beside(now.box.model))
+    return COST if rougher and not is_rugged(now.box.model) else 1
 
 
 def _ends_within(larger: Hypothesis) -> bool:

@@ -10,7 +10,7 @@ from pma_gym.discovery.grey_box.kept_fits import fit
 from pma_gym.discovery.grey_box.prepared_trials import PreparedTrials
 from pma_gym.discovery.grey_box.slots import own_coordinates
 from pma_gym.discovery.grey_box.thresholds import LEAST_TRIALS, ODD
-from pma_gym.estimation.innovations import GreyBox, Point, is_rough, log_likelihood
+from pma_gym.estimation.innovations import GreyBox, Point, is_rugged, log_likelihood
 from pma_gym.estimation.likelihood_fit import Coordinate, value_of, with_tied, with_values
 
 STARTS, SMOOTH_STARTS = 5, 3
@@ -50,7 +50,7 @@ def first_fit(
     """The model as it came, fitted; `tell` is called with what is done of its total."""
     own, tied = own_coordinates(trials.box(trials.model))
     coordinates = [*own, *trials.nuisances()]
-    rough, number = is_rough(trials.model), len(trials.logged)
+    rough, number = is_rugged(trials.model), len(trials.logged)
     count = STARTS if rough else SMOOTH_STARTS
     kinds: Sequence[bool] = (False, True)
     fits: dict[bool, list[Hypothesis]] = {linear: [] for linear in kinds}

@@ -11,12 +11,12 @@ from pma_gym.discovery.grey_box.prepared_trials import CLOSE, ROUGH, PreparedTri
 from pma_gym.discovery.grey_box.slots import slot
 from pma_gym.effects import CATALOGUE
 from pma_gym.estimation.innovations import GreyBox, Point
-from pma_gym.estimation.likelihood_fit import Coordinate, Fit
+from pma_gym.estimation.likelihood_fit import OTHERS, Coordinate, Fit
 
 
 @dataclass(frozen=True)
 class Move:
-    """One thing that a model may lack: an effect, or a parameter that differs by trial.
+    """One thing that a model may lack: an effect, a parameter that differs by trial, a clock.
 
     Attributes:
         name: of the effect, or the parameter's slot with its mark.
@@ -25,7 +25,7 @@ class Move:
         candidate: the effect.
         probe: its most promising probe.
         amount: how many times the probe's size.
-        slots: of parameters by trial.
+        slots: of parameters by trial, or `clock`.
         start: where its fit begins, if not at what it is added to.
     """
 
@@ -37,6 +37,11 @@ class Move:
     amount: float = 0.0
     slots: tuple[str, ...] = ()
     start: Point | None = None
+
+    @property
+    def is_nuisance(self) -> bool:
+        """Whether it is of the logging alone: no part of the rig."""
+        return self.candidate is None and set(self.slots) <= set(OTHERS)
 
 
 @dataclass(frozen=True)

@@ -118,19 +118,11 @@ def latent_line(trials: Sequence[Smoothed]) -> tuple[float, float] | None:
     None where no line does, or where the rig itself moves at that frequency: then it goes with the
     motion.
     """
-    step = float(np.median(np.concatenate([np.diff(each.time) for each in trials])))
-    padded = FINER * max(len(each.time) for each in trials)
     shortest = min(float(each.time[-1] - each.time[0]) for each in trials)
-    hertz = np.fft.rfftfreq(padded, step)
 
     def peak(rows: Sequence[Array]) -> tuple[float, float]:
-        power, total = np.zeros(len(hertz)), 0.0
-        for each, row in zip(trials, rows, strict=True):
-            even = np.interp(np.arange(each.time[0], each.time[-1], step), each.time, row)
-            even -= even.mean()
-            power += 2.0 / len(even) * np.abs(np.fft.rfft(even, padded)) ** 2
-            total += float(even @ even)
-        at = int(np.argmax(power * (hertz > PERIODS / shortest)))
+        hertz, power, total = line_power([each.time for each in trials], rows)
+        at = int(np.argmax(power))
         return float(hertz[at]), float(power[at]) / max(total, 1e-300)
 
     line, share = peak([each.force for each in trials])
@@ -138,6 +130,24 @@ def latent_line(trials: Sequence[Smoothed]) -> tuple[float, float] | None:
     if share < LEFT or moved > LEFT and abs(line - motion) < 1.0 / shortest:
         return None
     return line, share
+
+
+def line_power(times: Sequence[Array], rows: Sequence[Array]) -> tuple[Array, Array, float]:
+    """Frequencies (Hz), sums of squares that waves of each explain, and the whole sum of squares.
+
+    Of fewer than some periods in the shortest trial a wave is no line: it explains nothing.
+    """
+    step = float(np.median(np.concatenate([np.diff(time) for time in times])))
+    padded = FINER * max(map(len, times))
+    shortest = min(float(time[-1] - time[0]) for time in times)
+    hertz = np.fft.rfftfreq(padded, step)
+    power, total = np.zeros(len(hertz)), 0.0
+    for time, row in zip(times, rows, strict=True):
+        even = np.interp(np.arange(time[0], time[-1], step), time, row)
+        even -= even.mean()
+        power += 2.0 / len(even) * np.abs(np.fft.rfft(even, padded)) ** 2
+        total += float(even @ even)
+    return hertz, power * (hertz > PERIODS / shortest), total
 
 
 def line_over_position(trials: Sequence[Smoothed]) -> float:

@@ -9,11 +9,11 @@ from numpy.typing import NDArray
 from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
 from pma_gym.discovery.grey_box.hypothesis import Hypothesis, Move, added_paths
 from pma_gym.discovery.grey_box.latent_law import line_over_position
-from pma_gym.discovery.grey_box.prepared_trials import PreparedTrials
+from pma_gym.discovery.grey_box.prepared_trials import CLOCK, PreparedTrials
 from pma_gym.discovery.grey_box.slots import gains_of_drive, quantity_of, slot, values_of
 from pma_gym.discovery.grey_box.thresholds import LEAST_TRIALS, ODD, TRIED
 from pma_gym.estimation.innovations import TREND, TRIAL
-from pma_gym.estimation.likelihood_fit import STEP, Coordinate, with_tied, with_values
+from pma_gym.estimation.likelihood_fit import OTHERS, STEP, Coordinate, with_tied, with_values
 from pma_gym.estimation.smoother import smoothed
 
 Array = NDArray[np.float64]
@@ -69,8 +69,10 @@ class Screening:
             for name in gains_of_drive(self.trials.model)
             if name not in own
         ]
+        clock = [] if CLOCK.name in own else [CLOCK]
         mean = [
             *drive,
+            *clock,
             *(c for c in fitted.coordinates if " " not in c.name and c.name != "memory"),
         ]
         beside = [
@@ -81,7 +83,7 @@ class Screening:
         ]
         white = self.trials.white(box, [fitted.point, *beside])
         error, slopes = white[0], np.nan_to_num((white[1:] - white[0]) / STEP)
-        basis = np.linalg.qr(slopes[len(drive) :].T)[0]
+        basis = np.linalg.qr(slopes[len(drive) + len(clock) :].T)[0]
 
         def beyond(rows: Array) -> Array:
             return rows - (rows @ basis) @ basis.T
@@ -91,6 +93,8 @@ class Screening:
             *self._effects(now, error, left, beyond),
             *_by_trial(now, mean, slopes, left, beyond),
         ]
+        for each, slope in zip(clock, slopes[len(drive) :], strict=False):
+            moves += _varying(each.name, slope, left, beyond)
         price = 0.5 * np.log(len(error))
         return sorted(moves, key=lambda move: move.numbers * price - move.promise)
 
@@ -167,23 +171,29 @@ def _by_trial(
     moves = []
     for c, slope in zip(mean, slopes, strict=True):
         alone = TREND in c.name or TRIAL in c.name
-        if alone or c.name == "delay" or c.name.endswith("presliding"):
+        if alone or c.name in OTHERS or c.name.endswith("presliding"):
             continue
         columns = {f"{c.name}{TREND}": slope * now.box.order[of]}
         columns |= {f"{c.name}{TRIAL}{i}": slope * (of == i) for i in range(count)}
         for name, column in columns.items():
-            change = beyond(column)
-            square = float(change @ change)
-            if square > NOTHING:
-                amount = -float(left @ change) / square
-                promise = 0.5 * amount**2 * square
-                moves.append(Move(name, promise, 1, amount=amount, slots=(name,)))
+            moves += _varying(name, column, left, beyond)
     return moves
 
 
+def _varying(name: str, column: Array, left: Array, beyond: Callable[[Array], Array]) -> list[Move]:
+    """A further number whose derivative is a column; none where that tells nothing of it."""
+    change = beyond(column)
+    square = float(change @ change)
+    if square <= NOTHING:
+        return []
+    amount = -float(left @ change) / square
+    return [Move(name, 0.5 * amount**2 * square, 1, amount=amount, slots=(name,))]
+
+
 def _odd(now: Hypothesis, moves: Sequence[Move]) -> list[Move]:
-    """Each parameter of the trial whose latent force stands out."""
+    """The clock, and each parameter of the trial whose latent force stands out."""
     forces = np.array(now.fit.point.forces)
     odd = int(np.argmax(forces))
     alone = len(forces) >= LEAST_TRIALS and forces[odd] > ODD * float(np.median(forces))
-    return [move for move in moves if alone and move.name.endswith(f"{TRIAL}{odd}")]
+    own = f"{TRIAL}{odd}"
+    return [move for move in moves if move.is_nuisance or alone and move.name.endswith(own)]

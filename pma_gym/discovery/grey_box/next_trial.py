@@ -40,7 +40,7 @@ from pma_gym.estimation.innovations import (
     Point,
     Rows,
     counted,
-    is_rough,
+    is_rugged,
 )
 from pma_gym.estimation.likelihood_fit import STEP, with_tied, with_values
 from pma_gym.estimation.logged import Logged
@@ -187,7 +187,7 @@ class Question:
         runs, predicted = [], []
         for rival in self.rivals:
             # Where a motion turns that nobody has seen is not known: all steps are divided.
-            steps = rival.box.rows[0].steps * (TURNS if is_rough(rival.box.model) else 1)
+            steps = rival.box.rows[0].steps * (TURNS if is_rugged(rival.box.model) else 1)
             rows = Rows(logged, self.trials.channels, steps, self.trials.linear, 1)
             box = GreyBox(rival.box.model, [rows], rival.box.channels, rival.box.threads)
             unread = counted(rows, np.zeros(len(rows.time), bool))

@@ -1,13 +1,15 @@
 """What the trials of a rig say before any fit, and how a model is run over them."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pma_gym.discovery.grey_box.thresholds import FAINT, LOUD, STEP_MISS, STEP_SHARE
+from pma_gym.discovery.result.misfit import rms
 from pma_gym.effects.effect import signals
-from pma_gym.estimation.innovations import GreyBox, Point, Rows, is_rough
+from pma_gym.estimation.innovations import GreyBox, Point, Rows, is_rugged
 from pma_gym.estimation.likelihood_fit import Coordinate
 from pma_gym.estimation.logged import Logged
 from pma_gym.plant.model import Model
@@ -46,6 +48,39 @@ LEAST_FORCE = 1e-6
 MOST_DELAY = 20.0
 """Longest delay, in rows."""
 
+CLOCK = Coordinate("clock", 0.01, False, -0.05, 0.05)
+"""Share by which the readings' clock runs fast: quartz 1e-4, a timer in software up to 0.05."""
+
+
+@dataclass(frozen=True)
+class Hum:
+    """A line in the readings of one sensor that the rig does not move with.
+
+    Attributes:
+        channel: of the rig's signals.
+        hertz: its frequency in the readings.
+        waves: amplitude and phase in each trial, as complex numbers (SI).
+    """
+
+    channel: int
+    hertz: float
+    waves: Sequence[complex]
+
+    @property
+    def amplitude(self) -> float:
+        """Root mean square of the amplitudes of all trials (SI)."""
+        return rms(np.abs(self.waves))
+
+    def of(self, number: int, time: Array) -> Array:
+        """What it adds to one trial's readings at given times (s), of the same shape."""
+        return np.real(self.waves[number] * np.exp(2j * np.pi * self.hertz * time))
+
+    def out_of(self, number: int, logged: Logged) -> Logged:
+        """A trial without it."""
+        measured = logged.measured.copy()
+        measured[self.channel] -= self.of(number, np.asarray(logged.time, float))
+        return replace(logged, measured=measured)
+
 
 class PreparedTrials:
     """Trials with their noise, rows and steps, over which models are run.
@@ -57,18 +92,25 @@ class PreparedTrials:
         model: the model as it came.
         logged: the trials.
         threads: that filters run in at once.
+        hums: that are taken out of the readings.
     """
 
-    def __init__(self, model: Model, logged: Sequence[Logged], threads: int) -> None:
-        self.model, self.logged, self.threads = model, list(logged), threads
+    def __init__(
+        self, model: Model, logged: Sequence[Logged], threads: int, hums: Sequence[Hum] = ()
+    ) -> None:
+        self.model, self.threads, self.hums, self.raw = model, threads, tuple(hums), list(logged)
+        self.logged = self.raw
+        for hum in hums:
+            self.logged = [hum.out_of(i, each) for i, each in enumerate(self.logged)]
         self.linear = False
         self.channels = [
             i for i in range(len(model.rig.signals)) if any(each.measures[i] for each in logged)
         ]
-        readings = [
-            [each.measured[c][each.counts[c] > 0] for each in logged] for c in self.channels
-        ]
-        self.steps_of_readings = [reading_step(rows) for rows in readings]
+        raw, readings = (
+            [[each.measured[c][each.counts[c] > 0] for each in trials] for c in self.channels]
+            for trials in (self.raw, self.logged)
+        )
+        self.steps_of_readings = [reading_step(rows) for rows in raw]
         self.noise = [
             max(white_noise(rows), s / 12**0.5)
             for rows, s in zip(readings, self.steps_of_readings, strict=True)
@@ -90,6 +132,10 @@ class PreparedTrials:
         self.noise = [n / self.block**0.5 for n in self.noise]
         self._rows: dict[tuple[int, bool, bool], list[Rows]] = {}
         self.force = self._force()
+
+    def without(self, hums: Sequence[Hum]) -> "PreparedTrials":
+        """The same trials with hums taken out."""
+        return PreparedTrials(self.model, self.raw, self.threads, hums)
 
     def _block(self, readings: Sequence[Sequence[Array]]) -> int:
         total, block = sum(len(each.time) for each in self.logged), 1
@@ -126,11 +172,12 @@ class PreparedTrials:
         """
         steps = steps or self.steps
         linear = self.linear if linear is None else linear
-        key = steps, linear, is_rough(model)
+        rugged = is_rugged(model)
+        key = steps, linear, rugged
         if key not in self._rows:
             how = self.channels, steps, linear, self.block, self.stride, self.coarse
-            noise = self.noise if is_rough(model) else ()
-            self._rows[key] = [Rows(each, *how, not is_rough(model), noise) for each in self.logged]
+            noise = self.noise if rugged else ()
+            self._rows[key] = [Rows(each, *how, not rugged, noise) for each in self.logged]
         finest = self.noise[0] if self.channels[0] == 0 else 0.0
         return GreyBox(model, self._rows[key], self.channels, self.threads, finest)
 

@@ -18,7 +18,7 @@ from pma_gym.discovery.grey_box.slots import gains_of_drive, quantity_of, slot
 from pma_gym.discovery.grey_box.thresholds import FAR, LIKE, NOISES, SMALL
 from pma_gym.discovery.result.misfit import rms
 from pma_gym.discovery.thresholds import COMPLETE, SURE
-from pma_gym.estimation.likelihood_fit import value_of, with_tied, with_values
+from pma_gym.estimation.likelihood_fit import OTHERS, value_of, with_tied, with_values
 
 Array = NDArray[np.float64]
 
@@ -183,9 +183,10 @@ class Proposal:
 
 
 def _is_sized(each: Hypothesis, move: Move) -> bool:
-    """Whether some size of an added effect is surely not none."""
+    """Whether some size of an added effect, or of a clock's error, is surely not none."""
     if move.candidate is None:
-        return True
+        sizes = {n: abs(value_of(each.fit.point, n)) for n in move.slots if n in OTHERS}
+        return all(size > SURE * each.fit.deviations[n] for n, size in sizes.items())
     made, candidate = each.fit, move.candidate
     for path, none, size in zip(
         candidate.paths, candidate.absent, candidate.amplitudes, strict=True

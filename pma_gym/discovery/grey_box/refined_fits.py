@@ -2,11 +2,12 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 
 from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
-from pma_gym.discovery.grey_box.effect_fits import tried, weaker
+from pma_gym.discovery.grey_box.effect_fits import SLIPS, tried, weaker
 from pma_gym.discovery.grey_box.first_fit import SHARES, hold_fits
 from pma_gym.discovery.grey_box.hypothesis import Hypothesis, Move, precise_fit
 from pma_gym.discovery.grey_box.prepared_trials import PreparedTrials
@@ -57,12 +58,24 @@ def _freed(
         return now
     # What is free already begins again from other shapes.
     coordinates = {c.name: c for c in (*now.fit.coordinates, *more)}.values()
-    best = now
+    # The simpler law has made up for what it lacks, by its presliding distance too.
+    slips = {
+        name: [value, *(share * quantity_of(name).to_si(usual) for share in SLIPS)]
+        for name, value in point.numbers.items()
+        if name.startswith(f"{effect}.presliding") and (usual := quantity_of(name).usual)
+    }
+    starts = []
     for wide in WIDER:
         shaped = {n: v * (1.0 if n in now.fit.tied else wide) for n, v in values.items()}
-        start = with_values(point, with_tied(shaped, tied))
-        begin = weaker(trials, start, 0.3)
-        made = precise_fit(trials, now.box, begin, list(coordinates), tied, rough=True)
+        begin = weaker(trials, with_values(point, with_tied(shaped, tied)), 0.3)
+        starts += [
+            with_values(begin, dict(zip(slips, way, strict=True)))
+            for way in (product(*slips.values()) if slips else [()])
+        ]
+    likely = log_likelihood(now.box.innovations(starts), now.box.rows)
+    best = now
+    for i in np.argsort(-likely)[: len(WIDER)]:
+        made = precise_fit(trials, now.box, starts[i], list(coordinates), tied, rough=True)
         best = made if made.fit.value > best.fit.value else best
     return again(trials, replace(now, box=best.box, fit=best.fit), best)
 

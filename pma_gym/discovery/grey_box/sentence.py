@@ -2,6 +2,7 @@
 
 from pma_gym.discovery.grey_box.conclusions import Conclusions
 from pma_gym.discovery.grey_box.latent_law import FORCES, largest_share
+from pma_gym.discovery.grey_box.prepared_trials import CLOCK
 from pma_gym.discovery.grey_box.sizes import estimate
 from pma_gym.discovery.grey_box.slots import path_of, quantity_of
 from pma_gym.discovery.grey_box.thresholds import MATERIAL
@@ -15,8 +16,11 @@ from pma_gym.discovery.report.figure_text import (
     signal_unit,
 )
 from pma_gym.discovery.report.size_text import sized_effects
+from pma_gym.discovery.result.estimates import Estimate
+from pma_gym.discovery.thresholds import CONFIDENCE
 from pma_gym.estimation.innovations import TREND, TRIAL
 from pma_gym.estimation.likelihood_fit import value_of
+from pma_gym.units import SI_FACTORS
 
 WHAT_TO_CHECK = (
     "A friction before it slips (presliding), a sharper law or the commands between rows may "
@@ -26,7 +30,27 @@ WHAT_TO_CHECK = (
 
 
 def sentence(conclusions: Conclusions) -> str:
-    """The verdict in a sentence or two."""
+    """The verdict in a sentence or two, and what is wrong with the logging."""
+    return " ".join([_verdict(conclusions), *_logging(conclusions)])
+
+
+def _logging(conclusions: Conclusions) -> list[str]:
+    """What is wrong with sensors and the clock."""
+    made, trials, said = conclusions.proposal.last.fit, conclusions.selection.trials, []
+    for hum in trials.hums:
+        signal = trials.model.rig.signals[hum.channel]
+        size = f"{figure(hum.amplitude / SI_FACTORS[signal.unit])} {signal.unit}"
+        said.append(f"The sensor of {signal.name} hums at {figure(hum.hertz)} Hz with {size}.")
+    if CLOCK.name not in made.deviations:
+        return said
+    value, error = 100.0 * made.point.clock, 100.0 * CONFIDENCE * made.deviations[CLOCK.name]
+    size, way = abs(value), "fast" if value > 0.0 else "slow"
+    off = estimate_text(Estimate(size, size - error, size + error, "%"))
+    return [*said, f"The clock of the readings runs {off} {way} beside that of the commands."]
+
+
+def _verdict(conclusions: Conclusions) -> str:
+    """What is missing or off, and what predictions miss by."""
     own, left = listed(by_trial(conclusions)), _left(conclusions)
     if conclusions.verdict == "effect":
         rest = f"; {own}" if own else ""
@@ -105,7 +129,8 @@ def _left(conclusions: Conclusions) -> str:
 def by_trial(conclusions: Conclusions) -> list[str]:
     """Parameters that differ by trial, a clause each."""
     said = []
-    for name in (name for move in conclusions.proposal.last.moves for name in move.slots):
+    rig = [move for move in conclusions.proposal.last.moves if not move.is_nuisance]
+    for name in (name for move in rig for name in move.slots):
         base = name.partition(TREND)[0].partition(TRIAL)[0]
         now, path = estimate(conclusions.proposal.last.fit, name), path_of(base)
         usual = quantity_of(base).from_si(value_of(conclusions.proposal.last.fit.point, base))

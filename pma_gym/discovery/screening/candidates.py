@@ -189,7 +189,7 @@ def _places(stem: str, quantity: Quantity, sizes: Sizes | None) -> tuple[float, 
 
 def _sized(effect: Effect, stem: str, quantity: Quantity, sizes: Sizes) -> Quantity:
     """A quantity with the usual value of these trials."""
-    if stem in effect.scanned:
+    if stem in effect.scanned or (effect.port.startswith(MOUNT) and effect.path_breakpoint):
         return sizes.within_way(quantity)
     return quantity if stem in effect.held else sizes.scaled(quantity)
 

@@ -204,6 +204,20 @@ class Uneven(lab.Laboratory):
 
 
 @pytest.mark.campaign
+def test_a_jammed_trial_is_said_without_what_stood_in_for_it(tmp_path):
+    hidden = lab.laboratory(911, 1, "one_trial")
+    for file, text in hidden.texts().items():
+        (tmp_path / file).write_text(text, encoding="utf-8")
+    diagnosis = diagnose(read_dataset(tmp_path), tmp_path / "model.toml", propose=False)
+    assert not diagnosis.effects, diagnosis.sentence
+    said = re.search(
+        r"run_02.csv alone needs coulomb_friction.static_n ([\d.]+) N", diagnosis.sentence
+    )
+    jammed = hidden.friction * (1.0 + hidden.trouble.size)
+    assert said and float(said[1]) == pytest.approx(jammed, rel=2e-4), diagnosis.sentence
+
+
+@pytest.mark.campaign
 @pytest.mark.parametrize(
     ("seed", "number", "name"),
     [(903, 5, "position_friction"), (902, 2, "joint_position_friction")],

@@ -1,12 +1,20 @@
 """Diagnoses of logs whose readings are wrong: the rigs of another simulator have what is known."""
 
+import re
 from dataclasses import replace
 from functools import cache
 
 import numpy as np
 import pytest
+from scipy.interpolate import CubicSpline
+from scipy.signal import lfilter
 
+from pma_gym import Plant
+from pma_gym.data.trial import Trial
 from pma_gym.discovery import diagnose
+from pma_gym.discovery.grey_box.hum import without_hum
+from pma_gym.discovery.grey_box.prepared_trials import PreparedTrials
+from pma_gym.estimation.logged import Logged
 from tests.discovery.grey_box import test_free_rigs as rigs
 
 NOISE = {"slide": 2e-5, "joint": 4e-4}
@@ -44,3 +52,77 @@ def test_a_bent_sensor_is_named_with_its_curvature():
     diagnosis = diagnosed("slide", lambda _, q: q + 0.1 * q**2)
     sizes = {effect.name: effect.parameters for effect in diagnosis.effects}
     assert holds(sizes["lvdt_bend"]["curvature_percent_per_mm"], 0.01), diagnosis.sentence
+
+
+def lost(position, width):
+    """What a sensor reads behind a play that friction holds."""
+    place, shown = position[0], []
+    for q in position:
+        place = min(max(place, q - 0.5 * width), q + 0.5 * width)
+        shown.append(place)
+    return np.array(shown)
+
+
+def test_play_before_a_sensor_is_named_with_its_width():
+    diagnosis = diagnosed("slide", lambda _, q: lost(q, 4e-4))
+    (effect,) = diagnosis.effects
+    assert effect.name == "lvdt_backlash", diagnosis.sentence
+    assert effect.parameters["width_mm"].value == pytest.approx(0.4, rel=0.02)
+
+
+def test_a_clock_that_runs_fast_is_said_with_its_share_and_is_no_effect():
+    """Readings at labels that are 0.4 % ahead of the commands' time."""
+    fast = 4e-3
+    diagnosis = diagnosed("slide", lambda t, q: CubicSpline(t, q)(t / (1.0 + fast)))
+    assert diagnosis.verdict == "parameters", diagnosis.sentence
+    assert not diagnosis.effects
+    said = re.search(r"clock of the readings runs ([\d.]+) % .* fast", diagnosis.sentence)
+    assert said and float(said[1]) == pytest.approx(100.0 * fast, rel=0.05), diagnosis.sentence
+    mass = diagnosis.model.parameters["slide"].mass
+    assert mass == pytest.approx(rigs.RIGS["slide"][0], rel=3e-3)
+
+
+def test_the_hum_of_a_sensor_is_said_and_leaves_no_misfit():
+    size, hertz = 2e-4, 37.3
+    diagnosis = diagnosed("slide", lambda t, q: q + size * np.sin(2.0 * np.pi * hertz * t + 1.0))
+    assert not diagnosis.effects, diagnosis.sentence
+    said = re.search(
+        r"sensor of contraction hums at ([\d.]+) Hz with ([\d.]+) mm", diagnosis.sentence
+    )
+    assert said, diagnosis.sentence
+    assert float(said[1]) == pytest.approx(hertz, rel=1e-3)
+    assert float(said[2]) == pytest.approx(1e3 * size, rel=0.03)
+    (line,) = diagnosis.nuisances
+    assert line.hertz == pytest.approx(hertz, abs=0.02)
+    after = re.search(r"miss by ([\d.]+) mm", diagnosis.sentence)
+    assert after and float(after[1]) < 1.2e3 * NOISE["slide"]
+
+
+def test_readings_without_hum_have_no_line():
+    """Nor have those whose noise has a colour: its spectrum is high in a band."""
+    for colour in (0.0, 0.8):
+        trials = []
+        for i, trial in enumerate(moved("slide")):
+            noise = NOISE["slide"] * np.random.default_rng(i).standard_normal(len(trial.time))
+            read = trial.measurements["contraction"] + lfilter([1.0], [1.0, -colour], noise)
+            trials.append(replace(trial, measurements={"contraction": read}))
+        made = rigs.model("slide")
+        every = [Logged.of(made, i, trial) for i, trial in enumerate(trials)]
+        assert not without_hum(PreparedTrials(made, every, 1)).hums
+
+
+def test_a_hum_is_taken_out_of_averaged_rows_too():
+    """Where several readings are one row, which hums less than they do."""
+    time = np.arange(60_000) * 1e-3
+    generator = np.random.default_rng(3)
+    load = np.repeat(generator.uniform(-20.0, 20.0, 61), 1000)[: len(time)]
+    made = rigs.model("slide")
+    motion = Plant(made).simulate(Trial(time, {"load_command": load}), noise=False)
+    read = motion.measurements["contraction"] + 2e-5 * generator.standard_normal(len(time))
+    read += 1e-4 * np.cos(2.0 * np.pi * 50.02 * time)
+    trial = Trial(time, {"load_command": load}, {"contraction": read})
+    prepared = PreparedTrials(made, [Logged.of(made, 0, trial)], 1)
+    assert prepared.block > 1
+    (hum,) = without_hum(prepared).hums
+    assert hum.hertz == pytest.approx(50.02, abs=1e-3)
+    assert hum.amplitude == pytest.approx(1e-4, rel=0.02)

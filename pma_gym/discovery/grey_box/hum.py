@@ -1,0 +1,139 @@
+"""Hum of the sensors: a line in the readings that the rig does not move with, taken out of them.
+
+A hum is linear in the innovations of any filter, so its waves and its frequency are found by a few
+steps of Gauss and Newton on a filter that follows whatever moves. No model need be right for that.
+"""
+
+from collections.abc import Sequence
+from copy import copy
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import median_filter
+
+from pma_gym.discovery.grey_box.latent_law import line_power
+from pma_gym.discovery.grey_box.prepared_trials import Hum, PreparedTrials
+from pma_gym.discovery.grey_box.thresholds import LIKE
+from pma_gym.estimation.innovations import Point, Rows
+
+Array = NDArray[np.float64]
+
+ROUNDS, MOST_HUMS, STIFF, BESIDE, SHIFT = 4, 3, 0.1, 201, 0.01
+"""For the numerics.
+
+Steps of Gauss and Newton; lines that are looked for; latent force, as a share of the drive's, with
+which the filter follows whatever moves; points of the spectrum that a line stands out of; and, for
+derivatives, periods by which another frequency differs over the longest trial.
+"""
+
+
+def without_hum(trials: PreparedTrials) -> PreparedTrials:
+    """The trials with their hum taken out of the readings, which `trials.hums` lists."""
+    for _ in range(MOST_HUMS):
+        hums = [hum for at in range(len(trials.channels)) if (hum := _hum(trials, at))]
+        if not hums:
+            break
+        trials = trials.without([*trials.hums, *hums])
+    return trials
+
+
+@dataclass(frozen=True)
+class _Followed:
+    """What a filter that follows whatever moves makes of one signal, of each trial.
+
+    Attributes:
+        times: of the rows (s).
+        left: innovations (SI).
+        expected: what the filter expects (SI).
+        white: innovations of all signals and trials, in their deviations.
+        sizes: their number in each trial.
+    """
+
+    times: list[Array]
+    left: list[Array]
+    expected: list[Array]
+    white: Array
+    sizes: list[int]
+
+
+def _followed(trials: PreparedTrials, at: int, hum: Hum | None = None) -> _Followed:
+    """The same without a hum."""
+    box = trials.box(trials.model)
+    every = trials.span / (trials.stride * trials.block)
+    rows = [_without(each, at, hum, i, every) if hum else each for i, each in enumerate(box.rows)]
+    forces = (STIFF * trials.force,) * len(rows)
+    point = Point(box.numbers(), tuple(trials.noise), forces, trials.memory[0])
+    results = box.innovations([point], rows)
+    times, left, expected, white = [], [], [], []
+    for each, (errors, spreads) in zip(rows, results, strict=True):
+        know = each.measured[:, at]
+        times.append(each.time[know])
+        left.append(errors[0, know, at])
+        expected.append(each.readings[know, at, 0] - errors[0, know, at])
+        white.append((errors[0] / np.sqrt(spreads[0]))[each.there])
+    return _Followed(times, left, expected, np.concatenate(white), list(map(len, white)))
+
+
+def _without(rows: Rows, at: int, hum: Hum, number: int, every: float) -> Rows:
+    """A trial's rows, of readings every so many seconds, without a hum in one signal."""
+    other = copy(rows)
+    other.readings = rows.readings.copy()
+    # The mean over a block of readings hums less.
+    turn, size = np.pi * hum.hertz * every, rows.sizes[0]
+    other.readings[:, at, 0] -= (
+        np.sin(size * turn) / (size * np.sin(turn)) * hum.of(number, rows.time)
+    )
+    other.finer = rows.finer and _without(rows.finer, at, hum, number, every)
+    return other
+
+
+def _hum(trials: PreparedTrials, at: int) -> Hum | None:
+    """The line that stands out most in the readings of one signal.
+
+    None where the rig moves more at its frequency, or where it is not worth its price: that of a
+    frequency among those of the spectrum, and of a wave in each trial.
+    """
+    before = _followed(trials, at)
+    hertz, power, _ = line_power(before.times, before.left)
+    # A noise with a colour has no line: against what is left around it.
+    around = median_filter(power, BESIDE, mode="nearest")
+    loudest = int(np.argmax(power / np.maximum(around, 1e-300)))
+    hum = Hum(trials.channels[at], float(hertz[loudest]), [0j] * len(before.times))
+    moved, left = (_power(hum.hertz, before.times, rows) for rows in (before.expected, before.left))
+    if moved > left:
+        return None
+    now = before
+    for _ in range(ROUNDS):
+        hum = _nearer(trials, at, hum, now)
+        now = _followed(trials, at, hum)
+    level = around[loudest] / np.median(power[power > 0.0])
+    gain = 0.5 * float(before.white @ before.white - now.white @ now.white)
+    price = (len(now.times) + 0.5) * np.log(len(now.white)) + np.log(len(hertz))
+    return hum if gain > (price + LIKE) * max(level, 1.0) else None
+
+
+def _nearer(trials: PreparedTrials, at: int, hum: Hum, now: _Followed) -> Hum:
+    """A hum with waves, and once it has some with a frequency, by a step of Gauss and Newton."""
+    size, count = trials.noise[at], len(now.times)
+    shift = SHIFT / max(float(time[-1] - time[0]) for time in now.times)
+    others = [replace(hum, waves=[w + step for w in hum.waves]) for step in (size, 1j * size)]
+    others += [replace(hum, hertz=hum.hertz + shift)] if any(hum.waves) else []
+    slopes = np.array([_followed(trials, at, other).white - now.white for other in others])
+    of = np.repeat(np.arange(count), now.sizes)
+    columns = [np.where(of == i, slope, 0.0) for slope in slopes[:2] for i in range(count)]
+    columns += list(slopes[2:])
+    steps = -np.linalg.lstsq(np.array(columns).T, now.white, rcond=None)[0]
+    parts = size * (steps[:count] + 1j * steps[count : 2 * count])
+    further = float(np.clip(sum(steps[2 * count :]), -0.3 / SHIFT, 0.3 / SHIFT))
+    waves = [w + part for w, part in zip(hum.waves, parts.tolist(), strict=True)]
+    return replace(hum, hertz=hum.hertz + shift * further, waves=waves)
+
+
+def _power(hertz: float, times: Sequence[Array], rows: Sequence[Array]) -> float:
+    """Square of a frequency's amplitude in rows, as a tapered transform sees it."""
+    pairs = zip(times, rows, strict=True)
+    return sum(
+        abs(np.mean(np.hanning(len(row)) * row * np.exp(-2j * np.pi * hertz * time))) ** 2
+        for time, row in pairs
+    )
