@@ -92,7 +92,7 @@ def _hum(trials: PreparedTrials, at: int) -> Hum | None:
     """The line that stands out most in the readings of one signal.
 
     None where the rig moves more at its frequency, or where it is not worth its price: that of a
-    frequency among those of the spectrum, and of a wave in each trial.
+    wave in every single trial, and of a frequency among those of the spectrum.
     """
     before = _followed(trials, at)
     hertz, power, _ = line_power(before.times, before.left)
@@ -108,9 +108,11 @@ def _hum(trials: PreparedTrials, at: int) -> Hum | None:
         hum = _nearer(trials, at, hum, now)
         now = _followed(trials, at, hum)
     level = around[loudest] / np.median(power[power > 0.0])
-    gain = 0.5 * float(before.white @ before.white - now.white @ now.white)
-    price = (len(now.times) + 0.5) * np.log(len(now.white)) + np.log(len(hertz))
-    return hum if gain > (price + LIKE) * max(level, 1.0) else None
+    firsts = np.cumsum([0, *now.sizes[:-1]])
+    gains = 0.5 * np.add.reduceat(before.white**2 - now.white**2, firsts) / max(level, 1.0)
+    waves = np.log(np.array(now.sizes))
+    beyond = gains.sum() - waves.sum() - 0.5 * np.log(len(now.white)) - np.log(len(hertz))
+    return hum if (gains > waves).all() and beyond > LIKE else None
 
 
 def _nearer(trials: PreparedTrials, at: int, hum: Hum, now: _Followed) -> Hum:
@@ -134,6 +136,6 @@ def _power(hertz: float, times: Sequence[Array], rows: Sequence[Array]) -> float
     """Square of a frequency's amplitude in rows, as a tapered transform sees it."""
     pairs = zip(times, rows, strict=True)
     return sum(
-        abs(np.mean(np.hanning(len(row)) * row * np.exp(-2j * np.pi * hertz * time))) ** 2
+        float(abs(np.mean(np.hanning(len(row)) * row * np.exp(-2j * np.pi * hertz * time)))) ** 2
         for time, row in pairs
     )

@@ -140,7 +140,7 @@ def line_power(times: Sequence[Array], rows: Sequence[Array]) -> tuple[Array, Ar
     step = float(np.median(np.concatenate([np.diff(time) for time in times])))
     padded = FINER * max(map(len, times))
     shortest = min(float(time[-1] - time[0]) for time in times)
-    hertz = np.fft.rfftfreq(padded, step)
+    hertz = np.asarray(np.fft.rfftfreq(padded, step), float)
     power, total = np.zeros(len(hertz)), 0.0
     for time, row in zip(times, rows, strict=True):
         even = np.interp(np.arange(time[0], time[-1], step), time, row)
