@@ -1,5 +1,6 @@
 """Screening of what a model may lack: what is worth a fit."""
 
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
@@ -54,11 +55,11 @@ class Screening:
                 if move.candidate
             ]
             moves = [*moves[:TRIED], *fresh[:TRIED], *moves[TRIED:]]
-            return moves[: 2 * TRIED] + _odd(now, moves[2 * TRIED :])
+            return moves[: 2 * TRIED] + _beside(now, moves, 2 * TRIED)
         price = 0.5 * (0.5 * np.log(now.readings) + np.log(len(moves)))
         if not bent:
             return [move for move in moves[:TRIED] if move.promise > price]
-        return [*moves[:TRIED], *_odd(now, moves[TRIED:])]
+        return moves[:TRIED] + _beside(now, moves, TRIED)
 
     def _moves(self, now: Hypothesis) -> list[Move]:
         """All that may be added, by what it promises less its price, the most first."""
@@ -190,10 +191,26 @@ def _varying(name: str, column: Array, left: Array, beyond: Callable[[Array], Ar
     return [Move(name, 0.5 * amount**2 * square, 1, amount=amount, slots=(name,))]
 
 
-def _odd(now: Hypothesis, moves: Sequence[Move]) -> list[Move]:
-    """The clock, and each parameter of the trial whose latent force stands out."""
+def _beside(now: Hypothesis, moves: Sequence[Move], first: int) -> list[Move]:
+    """Further moves behind the first ones.
+
+    The clock, each parameter of the trial whose latent force stands out, and each that may differ
+    as the most promising one does: in that trial, or from trial to trial. A drive's gain that falls
+    is a friction, an inertia and a damping that rise, and none of these promises as much as all.
+    """
     forces = np.array(now.fit.point.forces)
     odd = int(np.argmax(forces))
     alone = len(forces) >= LEAST_TRIALS and forces[odd] > ODD * float(np.median(forces))
-    own = f"{TRIAL}{odd}"
-    return [move for move in moves if move.is_nuisance or alone and move.name.endswith(own)]
+    ends = [f"{TRIAL}{odd}"] if alone else []
+    marks = (re.split(f"(?=[{TREND}{TRIAL}])", m.name)[-1] for m in moves[:first] if _differs(m))
+    ends += [*marks][:1]
+    return [
+        m
+        for m in moves[first:]
+        if m.is_nuisance or _differs(m) and any(m.name.endswith(end) for end in ends)
+    ]
+
+
+def _differs(move: Move) -> bool:
+    """Whether it is a parameter that differs by trial."""
+    return bool(move.slots) and not move.is_nuisance
