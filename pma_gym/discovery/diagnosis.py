@@ -67,7 +67,7 @@ class Diagnosis:
         tones: where the verdict is `unknown`, the frequency (Hz) at which a signal's residual
             oscillates, for those that do; of a slide or joint, what acts on it.
         floors: noise by column name.
-        nuisances: mains lines, drifts and coloured noise in the readings.
+        nuisances: mains lines, drifts and coloured noise in the readings, and their clock.
         adequacy: what is left of each signal, by its column.
         states: what belongs to each trial (zeros, starts) beside the amended model, by its name.
         written: misfit of the amended model with these, over all trials, by column in its unit:

@@ -81,7 +81,7 @@ def diagnosis(conclusions: Conclusions, propose: bool) -> Diagnosis:
         if conclusions.verdict == "unknown" and conclusions.line
         else {},
         floors=floors,
-        nuisances=_hums(conclusions),
+        nuisances=_nuisances(conclusions),
         states=conclusions.states,
         trials=conclusions.records,
         steps=_steps(conclusions),
@@ -89,21 +89,20 @@ def diagnosis(conclusions: Conclusions, propose: bool) -> Diagnosis:
     )
 
 
-def _hums(conclusions: Conclusions) -> tuple[Nuisance, ...]:
-    """Hums of the sensors, in standard deviations of their noise."""
-    trials, noise = conclusions.selection.trials, conclusions.proposal.last.fit.point.deviations
-    return tuple(
-        Nuisance(
-            "line",
-            {
-                trials.model.rig.signals[hum.channel].column: hum.amplitude
-                / 2.0**0.5
-                / noise[trials.channels.index(hum.channel)]
-            },
-            hum.hertz,
-        )
+def _nuisances(conclusions: Conclusions) -> tuple[Nuisance, ...]:
+    """Hums of the sensors, in standard deviations of their noise, and the readings' clock."""
+    trials, point = conclusions.selection.trials, conclusions.proposal.last.fit.point
+    columns = [BY_QUANTITY[trials.model.rig.signals[c].name].name for c in trials.channels]
+    sizes = [
+        hum.amplitude / 2.0**0.5 / point.deviations[trials.channels.index(hum.channel)]
         for hum in trials.hums
-    )
+    ]
+    hums = [
+        Nuisance("line", {columns[trials.channels.index(hum.channel)]: size}, hum.hertz)
+        for hum, size in zip(trials.hums, sizes, strict=True)
+    ]
+    clock = [Nuisance("clock", dict.fromkeys(columns, point.clock))] if point.clock else []
+    return (*hums, *clock)
 
 
 def rival_models(conclusions: Conclusions) -> tuple[RivalModel, ...]:

@@ -3,6 +3,7 @@
 from pma_gym.discovery.diagnosis import Diagnosis
 from pma_gym.discovery.report.effect_text import effect_names
 from pma_gym.discovery.report.figure_text import duration, figure, listed, signal_name
+from pma_gym.discovery.result.noise import Nuisance
 
 
 def what_to_do(diagnosis: Diagnosis) -> list[str]:
@@ -14,9 +15,24 @@ def what_to_do(diagnosis: Diagnosis) -> list[str]:
         "unknown": _describe,
         "undecidable": _measure,
     }[diagnosis.verdict](diagnosis)
+    steps += [_fix(each) for each in diagnosis.nuisances if diagnosis.given.rig.is_free]
     if diagnosis.next_experiment and diagnosis.verdict != "undecidable":
         steps.append(_run_next(diagnosis))
     return steps
+
+
+def _fix(nuisance: Nuisance) -> str:
+    where = listed([f"`{column}`" for column in nuisance.signals])
+    if nuisance.kind == "clock":
+        (share,) = set(nuisance.signals.values())
+        return (
+            f"Log the commands and {where} by one clock, or divide the times of {where} by "
+            f"{1.0 + share:.7g}: a simulation of these logs drifts away from them."
+        )
+    return (
+        f"Shield the sensor of {where}, or filter {figure(nuisance.hertz or 0.0)} Hz: this answer "
+        "is without the hum, your logs are not."
+    )
 
 
 def _use_effect(diagnosis: Diagnosis) -> list[str]:

@@ -63,5 +63,7 @@ def _words(known: Nuisance, signals: int) -> str:
     size = figure(float(np.median(list(known.signals.values()))), 2)
     if known.kind == "coloured noise":
         return f"coloured noise in {where}, correlation {size} from reading to reading"
+    if known.kind == "clock":
+        return f"the clock of {where}, fast by {size} of its time"
     what = f"{known.hertz:.4g} Hz" if known.hertz is not None else "slow drift"
     return f"{what} in {where}, {size} sd"

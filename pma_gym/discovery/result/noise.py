@@ -39,9 +39,10 @@ class Nuisance:
     """What is neither the rig's nor white: fitted together with every candidate.
 
     Attributes:
-        kind: `line` (of the mains), `drift` or `coloured noise`.
+        kind: `line` (of the mains), `drift`, `coloured noise` or `clock`.
         signals: by column, its root mean square in standard deviations of the noise; of coloured
-            noise the correlation from one reading to the next.
+            noise the correlation from one reading to the next; of a clock the share by which it
+            runs fast beside that of the commands.
         hertz: frequency of a line; None of others.
     """
 

@@ -14,6 +14,7 @@ from pma_gym.data.trial import Trial
 from pma_gym.discovery import diagnose
 from pma_gym.discovery.grey_box.hum import without_hum
 from pma_gym.discovery.grey_box.prepared_trials import PreparedTrials
+from pma_gym.discovery.report.next_steps import what_to_do
 from pma_gym.estimation.logged import Logged
 from tests.discovery.grey_box import test_free_rigs as rigs
 
@@ -78,6 +79,13 @@ def test_a_clock_that_runs_fast_is_said_with_its_share_and_is_no_effect():
     assert not diagnosis.effects
     said = re.search(r"clock of the readings runs ([\d.]+) % .* fast", diagnosis.sentence)
     assert said and float(said[1]) == pytest.approx(100.0 * fast, rel=0.05), diagnosis.sentence
+    (clock,) = diagnosis.nuisances
+    assert clock.kind == "clock"
+    assert clock.signals["contraction_mm"] == pytest.approx(fast, rel=0.05)
+    # Readings whose times are divided as it says are those of the commands' clock.
+    (step,) = [each for each in what_to_do(diagnosis) if "one clock" in each]
+    by = re.search(r"by (1\.\d+)", step)
+    assert by and float(by[1]) == pytest.approx(1.0 + fast, abs=2e-4)
     mass = diagnosis.model.parameters["slide"].mass
     assert mass == pytest.approx(rigs.RIGS["slide"][0], rel=3e-3)
 
@@ -94,6 +102,7 @@ def test_the_hum_of_a_sensor_is_said_and_leaves_no_misfit():
     assert float(said[2]) == pytest.approx(1e3 * size, rel=0.03)
     (line,) = diagnosis.nuisances
     assert line.hertz == pytest.approx(hertz, abs=0.02)
+    assert any("filter 37.3 Hz" in step for step in what_to_do(diagnosis))
     after = re.search(r"miss by ([\d.]+) mm", diagnosis.sentence)
     assert after and float(after[1]) < 1.2e3 * NOISE["slide"]
 
