@@ -56,11 +56,7 @@ class Conclusions:
         effects = proposal.delayed or any(move.candidate for move in last.moves)
         material = proposal.share(last) > MATERIAL and proposal.is_latent
         incomplete = material or proposal.is_latent and self.predictions.misfit(last) > COMPLETE
-        if last.moves:
-            lacks = incomplete and proposal.left > LEFT
-        else:
-            lacks = material or incomplete and len(self.predictions.path) > 1
-        if lacks:
+        if incomplete and proposal.left > LEFT if last.moves else material:
             return "unknown"
         if proposal.far:
             return "undecidable"

@@ -1,7 +1,7 @@
 """Hum of the sensors: a line in the readings that the rig does not move with, taken out of them.
 
-A hum is linear in the innovations of any filter, so its waves and its frequency are found by a few
-steps of Gauss and Newton on a filter that follows whatever moves. No model need be right for that.
+A hum is linear in the innovations of a linear filter, so its waves and its frequency are found by a
+few steps of Gauss and Newton on a filter that follows whatever moves. No model need be right.
 """
 
 from collections.abc import Sequence
@@ -19,12 +19,13 @@ from pma_gym.estimation.innovations import Point, Rows
 
 Array = NDArray[np.float64]
 
-ROUNDS, MOST_HUMS, STIFF, BESIDE, SHIFT = 4, 3, 0.1, 201, 0.01
+ROUNDS, MOST_HUMS, STIFF, BESIDE, SHIFT, MOVED = 4, 3, 0.1, 201, 0.01, 3.0
 """For the numerics.
 
 Steps of Gauss and Newton; lines that are looked for; latent force, as a share of the drive's, with
-which the filter follows whatever moves; points of the spectrum that a line stands out of; and, for
-derivatives, periods by which another frequency differs over the longest trial.
+which the filter follows whatever moves; points of the spectrum that a line stands out of; for
+derivatives, periods by which another frequency differs over the longest trial; and how many times
+what is left of it the filter expects of a motion: of a hum it follows a part.
 """
 
 
@@ -59,7 +60,10 @@ class _Followed:
 
 def _followed(trials: PreparedTrials, at: int, hum: Hum | None = None) -> _Followed:
     """The same without a hum."""
-    box = trials.box(trials.model)
+    # Without dry friction, and what else is of the way: a filter with it is not linear.
+    rugged = [e.name for e in trials.model.effects.values() if e.rate_independent_law]
+    kept = {name: p for name, p in trials.model.parameters.items() if name not in rugged}
+    box = trials.box(replace(trials.model, parameters=kept))
     every = trials.span / (trials.stride * trials.block)
     rows = [_without(each, at, hum, i, every) if hum else each for i, each in enumerate(box.rows)]
     forces = (STIFF * trials.force,) * len(rows)
@@ -91,17 +95,21 @@ def _without(rows: Rows, at: int, hum: Hum, number: int, every: float) -> Rows:
 def _hum(trials: PreparedTrials, at: int) -> Hum | None:
     """The line that stands out most in the readings of one signal.
 
-    None where the rig moves more at its frequency, or where it is not worth its price: that of a
-    wave in every single trial, and of a frequency among those of the spectrum.
+    Beside those that are taken out. None where the rig moves at its frequency, or where it is
+    not worth its price: that of a wave in every single trial, and of a frequency among those of
+    the spectrum.
     """
     before = _followed(trials, at)
     hertz, power, _ = line_power(before.times, before.left)
     # A noise with a colour has no line: against what is left around it.
     around = median_filter(power, BESIDE, mode="nearest")
-    loudest = int(np.argmax(power / np.maximum(around, 1e-300)))
+    width = 1.0 / min(float(time[-1] - time[0]) for time in before.times)
+    taken = [each.hertz for each in trials.hums if each.channel == trials.channels[at]]
+    free = [~np.any(np.abs(np.array(taken) - each) < width) for each in hertz]
+    loudest = int(np.argmax(power / np.maximum(around, 1e-300) * free))
     hum = Hum(trials.channels[at], float(hertz[loudest]), [0j] * len(before.times))
     moved, left = (_power(hum.hertz, before.times, rows) for rows in (before.expected, before.left))
-    if moved > left:
+    if moved > MOVED**2 * left:
         return None
     now = before
     for _ in range(ROUNDS):
