@@ -19,7 +19,7 @@ from pma_gym.estimation.innovations import Point, Rows
 
 Array = NDArray[np.float64]
 
-ROUNDS, MOST_HUMS, STIFF, BESIDE, SHIFT, MOVED = 4, 3, 0.1, 201, 0.01, 3.0
+ROUNDS, MOST_HUMS, STIFF, BESIDE, SHIFT, MOVED = 4, 3, 0.1, 201, 0.01, 1.5
 """For the numerics.
 
 Steps of Gauss and Newton; lines that are looked for; latent force, as a share of the drive's, with
