@@ -56,7 +56,9 @@ class Conclusions:
         effects = proposal.delayed or any(move.candidate for move in last.moves)
         material = proposal.share(last) > MATERIAL and proposal.is_latent
         incomplete = material or proposal.is_latent and self.predictions.misfit(last) > COMPLETE
-        if incomplete and proposal.left > LEFT if last.moves else material:
+        if material and not last.moves:
+            return "unknown"
+        if last.moves and proposal.left > LEFT and incomplete:
             return "unknown"
         if proposal.far:
             return "undecidable"

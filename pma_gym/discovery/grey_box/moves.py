@@ -42,8 +42,8 @@ class Screening:
     def worth_a_fit(self, now: Hypothesis) -> list[Move]:
         """The moves that promise half their price.
 
-        Where there is a latent force, the first ones whatever they promise, and each parameter of a
-        trial whose latent force stands out.
+        Where there is a latent force, the first ones whatever they promise, and those that it may
+        hide (`_beside`).
         """
         moves, bent = self._moves(now), self.trials.is_bent(now.fit.point)
         if bent and not now.moves:
