@@ -293,7 +293,7 @@ class Rows:
         return first, motion, spread
 
 
-TURNS = 8
+TURNS = 2
 """Steps that a step is divided into in which the motion may turn."""
 
 

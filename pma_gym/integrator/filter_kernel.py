@@ -7,8 +7,10 @@ Between two rows mean and covariance move together in short steps of the Rosenbr
     = 1 - 1/sqrt(2)
 
 Dry friction is the bristle of the catalogue: while it sticks it is a stiff spring, which takes the
-variance of the speed away by itself. J has its slope over the way of the step. At a row the
-readings correct mean and covariance one after the other.
+variance of the speed away by itself. J has its slope over the way of the step. A step in which a
+slipping mass comes to rest ends there, and what is left of it begins with steps that are short
+enough for the bristle to give way: friction acts for none of the time in the old direction. At a
+row the readings correct mean and covariance one after the other.
 
 Source:
     J. G. Verwer, E. J. Spee, J. G. Blom, W. Hundsdorfer 1999, "A second-order Rosenbrock method
@@ -16,12 +18,14 @@ Source:
     "Stochastic Processes and Filtering Theory", for the filter.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 
 from llvmlite import ir
 
 from pma_gym.codegen.derivative import derivatives
+from pma_gym.codegen.generic import where
 from pma_gym.codegen.graph import CHANGING, FIXED, HELD, Value
 from pma_gym.codegen.machine.control import (
     INTEGER,
@@ -33,6 +37,8 @@ from pma_gym.codegen.machine.control import (
     integer,
     loop,
     offset,
+    repeat,
+    variable,
 )
 from pma_gym.codegen.machine.simd import SimdEmitter
 from pma_gym.codegen.trace import live_inputs, split, substitute, trace
@@ -47,8 +53,18 @@ FULL = 0.9999
 
 POLE = 1.0 - 0.5**0.5
 
+FAR = 1.0
+"""Way (m, rad) after which every bristle slips."""
+
 LEAST_WAY = 1e-12
 """Way (m, rad) over which the slope of friction is taken at least."""
+
+SLIPPING = 0.9
+"""Deflection of a bristle from which on its mass slips: it comes to rest, and nothing held it."""
+
+AFTER = 12
+"""Steps after the mass came to rest: the first two are the shortest, each further one is twice as
+long as the one before."""
 
 Entry = Value | None
 
@@ -68,6 +84,7 @@ class FilterEquations:
     noisy: str
     readings: Sequence[Value]
     bristles: Sequence[str] = ()
+    frozen: dict[int, Value] = field(init=False)
     step: list[Value] = field(init=False)
     transition: list[list[Entry]] = field(init=False)
     correction: list[Value] = field(init=False)
@@ -89,8 +106,40 @@ class FilterEquations:
         self.read = [graph.input(f"reading {i}", CHANGING) for i in range(len(self.readings))]
         self.counts = [graph.input(f"counts {i}", CHANGING) for i in range(len(self.readings))]
         self.moved, self.transition = self._moved()
+        self.stops, self.share = self._stop()
         self.step = [*self.moved, *self._spread()]
         self.correction = self._corrected()
+
+    def _stop(self) -> tuple[Value | None, Value]:
+        """Whether a slipping mass stops within a step, or a held one slips; at which share of it.
+
+        A held one slips where a bristle that gave way as at the start would bend beyond its end.
+        """
+        eq, one = self.eq, self.eq.graph.constant(1.0)
+        held = [m for m in eq.rate_independent_states if m.name in self.bristles]
+        if eq.travelled is None or not held:
+            return None, one
+        own = [state.value for state in eq.states]
+        way, speed = eq.travelled
+        ends = {v.id: new for v, new in zip(own, self.moved, strict=False)}
+        turned = speed * ends[speed.id] < 0.0
+        stops, share = None, speed / where(turned, speed - ends[speed.id], 1.0)
+        for each in held:
+            slips = turned & (each.value * where(speed > 0.0, 1.0, -1.0) > SLIPPING)
+            ((slope,),) = derivatives([each.after], [way])
+            assert slope is not None
+            bent = each.value + substitute([slope], self.frozen)[0] * (ends[way.id] - way)
+            now, then = (where(z < 0.0, -z, z) for z in (each.value, bent))
+            breaks = (now < SLIPPING) & (then > 1.0)
+            share = where(breaks, (1.0 - now) / where(breaks, then - now, 1.0), share)
+            either = slips | breaks
+            stops = either if stops is None else stops | either
+        return stops, share
+
+    @property
+    def stopping(self) -> list[Value]:
+        """What tells where a mass stops."""
+        return [] if self.stops is None else [self.stops, self.share]
 
     def p(self, i: int, j: int) -> Value:
         """Entry of the covariance."""
@@ -129,6 +178,7 @@ class FilterEquations:
         bent = substitute(rates, ends)
         second = solve([h * rate - 2.0 * k for rate, k in zip(bent, first, strict=True)])
         moved = [s.value + 1.5 * a + 0.5 * b for s, a, b in zip(own, first, second, strict=True)]
+        self.frozen = frozen
         columns = []
         for j in range(len(self.mean)):
             unit: list[Entry] = [None] * len(wrt)
@@ -165,12 +215,18 @@ class FilterEquations:
         """Take the slope of friction over the way of a whole step in place of that at its start.
 
         A bristle that slides is as stiff as ever at the start of a step and gives way within a
-        micrometre; ROS2 is of order 2 with any slopes.
+        micrometre; ROS2 is of order 2 with any slopes. The way ends where the mass would stop: one
+        that is held does not get far.
         """
-        eq = self.eq
+        eq, h = self.eq, self.true_length
         assert eq.travel is not None and eq.travelled is not None
         way, speed = eq.travelled
-        expected, direction = self.true_length * speed, frozen[eq["direction"].id]
+        direction = frozen[eq["direction"].id]
+        (slips,) = substitute([eq.rate_of(speed)], {**frozen, eq.travel.id: FAR * direction})
+        slows, forwards = -direction * slips, direction * speed
+        stopped = forwards / where(slows > 0.0, slows, 1.0)
+        lasts = where((slows > 0.0) & (stopped < h), stopped, h)
+        expected = lasts * speed
         far = direction * expected > LEAST_WAY
         ahead = eq.graph.select(far, expected, LEAST_WAY * direction)
         there = substitute(rates, {**frozen, eq.travel.id: ahead})
@@ -231,14 +287,23 @@ class FilterEquations:
                     total = _plus(total, _times(row[k], _plus(self.p(k, j), added.get((k, j)))))
                 across.append(total)
             half.append(across)
-        out = []
+        out = {}
         for i, j in self.covariance:
             total: Entry = None
             for k in range(n):
                 total = _plus(total, _times(half[i][k], self.transition[j][k]))
             total = _plus(total, added.get((i, j)))
-            out.append(zero if total is None else total)
-        return out
+            out[i, j] = zero if total is None else total
+        for place, state in enumerate(self.states):
+            if state.name in self.bristles:
+                # Between -1 and 1 it has a deviation of 1 at most, whatever its slope says.
+                variance = out[place, place]
+                share = where(variance > 1.0, variance, 1.0) ** -0.5
+                self.transition[place] = [_times(entry, share) for entry in self.transition[place]]
+                for i, j in out:
+                    for _ in range((i == place) + (j == place)):
+                        out[i, j] = out[i, j] * share
+        return list(out.values())
 
     def _corrected(self) -> list[Value]:
         """Mean and covariance after the readings, then each reading's innovation and variance."""
@@ -317,7 +382,7 @@ def _everything(made: FilterEquations, keeps: bool) -> list[Value]:
     transition = [
         entry for row in made.transition for entry in row if entry is not None and not _zero(entry)
     ]
-    return [*made.step, *made.correction, *(transition if keeps else ())]
+    return [*made.step, *made.correction, *made.stopping, *(transition if keeps else ())]
 
 
 def _fixed_inputs(values: Sequence[Value]) -> list[Value]:
@@ -338,7 +403,7 @@ def write_filter(module: Module, made: FilterEquations, width: int, keeps: bool)
     )
     firsts, times, commands, readings, parameters, start, out, kept = pointers
     everything = _everything(made, keeps)
-    transition = everything[len(made.step) + len(made.correction) :]
+    transition = everything[len(made.step) + len(made.correction) + len(made.stopping) :]
     fixed, inputs = split(everything, FIXED), _fixed_inputs(everything)
     loaded = {value.id: simd.load(b, parameters, i) for i, value in enumerate(inputs)}
     known_fixed = simd.emit(b, fixed, loaded)
@@ -370,15 +435,20 @@ def write_filter(module: Module, made: FilterEquations, width: int, keeps: bool)
         ends = (row, b.add(row, integer(1)))
         first, end = (b.load(offset(b, firsts, at, INTEGER), typ=INTEGER) for at in ends)
         with loop(b, end, first) as step:
-            known = load()
-            length = b.load(offset(b, times, step), typ=simd.element)
-            known[made.length.id] = simd.spread(b, length)
-            known[eq[COMMANDS[0]].id] = simd.load(b, commands, step)
-            emitted = simd.emit(b, [*made.step, *transition], known)
-            for i, value in enumerate(made.step):
-                simd.store(b, emitted[value.id], state, i)
-            if keeps:
-                _chain(b, simd, made, emitted, phi)
+            whole = simd.spread(b, b.load(offset(b, times, step), typ=simd.element))
+            command = simd.load(b, commands, step)
+            with _parts(b, simd, made, whole) as (length, finish):
+                known = load()
+                known[made.length.id] = length
+                known[eq[COMMANDS[0]].id] = command
+                emitted = simd.emit(b, [*made.step, *transition, *made.stopping], known)
+                ends = finish(emitted)
+                for i, value in enumerate(made.step):
+                    after = emitted[value.id]
+                    after = after if ends is None else b.select(ends, after, simd.load(b, state, i))
+                    simd.store(b, after, state, i)
+                if keeps:
+                    _chain(b, simd, made, emitted, phi, ends)
         base = b.mul(row, integer(slot))
         if keeps:
             for i in range(size):
@@ -403,8 +473,55 @@ def write_filter(module: Module, made: FilterEquations, width: int, keeps: bool)
     b.ret_void()
 
 
+@contextmanager
+def _parts(
+    b: Builder, simd: SimdEmitter, made: FilterEquations, whole: Operand
+) -> Iterator[tuple[Operand, Callable[[dict[int, Operand]], Operand | None]]]:
+    """Write a step once, which ends where a mass stops and goes on in short ones in such lanes.
+
+    Yields the length of a part, and a function that is called with what was emitted of it and gives
+    the lanes in which it counts; None for all.
+    """
+    if made.stops is None:
+        yield whole, lambda emitted: None
+        return
+    lengths, rests = (variable(b, simd.real, first) for first in (whole, simd.constant(0.0)))
+    stopped = variable(b, simd.truth, simd.constant(False, "truth"))
+    number = variable(b, INTEGER, integer(0))
+    with repeat(b) as leave_if:
+        length, now = b.load(lengths, typ=simd.real), b.load(number, typ=INTEGER)
+        is_first = b.icmp_signed("==", now, integer(0))
+        stops: list[Operand] = []
+
+        def finish(emitted: dict[int, Operand]) -> Operand:
+            assert made.stops is not None
+            first = simd.spread(b, is_first)
+            stops.append(b.select(first, emitted[made.stops.id], b.load(stopped, typ=simd.truth)))
+            stops.append(b.fmul(emitted[made.share.id], whole))
+            return b.xor(first, stops[0])
+
+        yield length, finish
+        leave_if(b.and_(is_first, b.not_(simd.any(b, stops[0]))))
+        leave_if(b.icmp_signed("==", now, integer(AFTER + 1)))
+        b.store(stops[0], stopped)
+        with b.if_then(is_first):
+            b.store(b.fsub(whole, stops[1]), rests)
+        shortest = b.fmul(b.load(rests, typ=simd.real), simd.constant(2.0 ** (1 - AFTER)))
+        following = b.fmul(length, simd.constant(2.0))
+        for place, taken in ((2, length), (1, shortest), (0, stops[1])):
+            at = b.icmp_signed("==", now, integer(place))
+            following = b.select(at, taken, following)
+        b.store(following, lengths)
+        b.store(b.add(now, integer(1)), number)
+
+
 def _chain(
-    b: Builder, simd: SimdEmitter, made: FilterEquations, emitted: dict, phi: Operand
+    b: Builder,
+    simd: SimdEmitter,
+    made: FilterEquations,
+    emitted: dict,
+    phi: Operand,
+    counts: Operand | None,
 ) -> None:
     """Multiply the transition since the last row by that of one more step."""
     n = len(made.mean)
@@ -419,4 +536,6 @@ def _chain(
                 assert entry is not None
                 part = b.fmul(emitted[entry.id], before[k * n + j])
                 total = part if total is None else b.fadd(total, part)
-            simd.store(b, simd.constant(0.0) if total is None else total, phi, i * n + j)
+            made_of = simd.constant(0.0) if total is None else total
+            kept = made_of if counts is None else b.select(counts, made_of, before[i * n + j])
+            simd.store(b, kept, phi, i * n + j)

@@ -20,9 +20,6 @@ WIDE = 5.0
 In those that the parameters' list has (10 % of them).
 """
 
-SHOWN = 1e-3
-"""Least presliding distance, in standard deviations of a reading of the position."""
-
 
 def slot(path: str) -> str:
     """`effect.parameter` of a path."""
@@ -108,10 +105,7 @@ def own_coordinates(box: GreyBox) -> tuple[list[Coordinate], dict[str, str]]:
 
 
 def presliding(effect: str, box: GreyBox) -> Coordinate:
-    """How far a contact gives before it slides, which no list of parameters has free.
-
-    No less than what readings of a position can show.
-    """
+    """How far a contact gives before it slides, which no list of parameters has free."""
     quantity = quantity_of(f"{effect}.presliding")
     low, high = quantity.to_si(quantity.lower), quantity.to_si(quantity.upper)
-    return Coordinate(f"{effect}.presliding", 1.0, True, max(low, SHOWN * box.finest), high, 2.0)
+    return Coordinate(f"{effect}.presliding", 1.0, True, low, high, 2.0)

@@ -286,8 +286,8 @@ def test_what_slides_takes_no_short_steps_however_little_friction_gives(preslidi
     prepared = PreparedTrials(known, logged, 1)
     numbers = prepared.box(known).numbers()
     right = Point(numbers, (noise,), (1e-2,) * 3, 0.06)
-    # A row is 10 ms.
-    assert prepared.precise(known, right).rows[0].steps <= 16
+    # A row is 10 ms; where readings turn it has `TURNS` times as many.
+    assert prepared.precise(known, right).rows[0].steps <= 32
     white = prepared.white(prepared.box(known, steps=16), [right])
     assert np.mean(white**2) == pytest.approx(1.0, abs=0.2)
 
