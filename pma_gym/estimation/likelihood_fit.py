@@ -2,8 +2,8 @@
 
 The score of a reading with innovation e and variance S is -(e / S) e' - (1 - e^2 / S) S' / (2 S),
 its expected information e' e' / S + S' S' / (2 S^2). Derivatives come from points that lie a small
-step away, all of them in the lanes of one run; so do the steps of eight damping factors (Levenberg
-and Marquardt), of which the best is taken.
+step away, those of numbers of single trials together, in the lanes of one run; so do the steps of
+eight damping factors (Levenberg and Marquardt), of which the best is taken.
 """
 
 from collections.abc import Mapping, Sequence
@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from pma_gym.estimation.innovations import GreyBox, Point, is_rugged, log_likelihood
+from pma_gym.estimation.innovations import TRIAL, GreyBox, Point, is_rugged, log_likelihood
 
 Array = NDArray[np.float64]
 
@@ -68,6 +68,13 @@ class Coordinate:
     lower: float = -np.inf
     upper: float = np.inf
     prior: float = 0.0
+
+    @property
+    def trial(self) -> int | None:
+        """Number of the only trial that it changes; None if it changes all."""
+        kind, _, number = self.name.partition(" ")
+        alone = number if kind == "force" else self.name.partition(TRIAL)[2]
+        return int(alone) if alone else None
 
     def of(self, point: Point) -> float:
         """The coordinate of a point."""
@@ -190,6 +197,7 @@ def fit(
         return log_likelihood(results, box.rows) - penalty, results
 
     x, damping, p = within(origin), 1e-3, len(coordinates)
+    together, of = _together(coordinates, len(box.rows))
     best = float(valued([x])[0][0])
     information, scores = np.eye(p), np.zeros((BLOCKS, p))
     sizes = [*(WIDE_STEPS if is_rugged(box.model) and not near else ()), STEP]
@@ -197,8 +205,8 @@ def fit(
     for _ in range(most if np.isfinite(best) else 0):
         size = sizes[0]
         signs = np.where(within(x + size) > x, size, -size)
-        _, results = valued([x, *(x + np.diag(signs))])
-        information, scores = _scored(box, results, signs)
+        _, results = valued([x, *(x + signs * together)])
+        information, scores = _scored(box, results, signs, of)
         gradient = scores.sum(axis=0) - weight * (x - origin)
         information += np.diag(weight)
         # What is at an end of its range and drawn beyond it takes no part in the step.
@@ -217,6 +225,26 @@ def fit(
     return Fit(point(x), best, tuple(coordinates), dict(tied), information, scores)
 
 
+def _together(
+    coordinates: Sequence[Coordinate], trials: int
+) -> tuple[NDArray[np.bool_], NDArray[np.int64]]:
+    """Which coordinates move in one run: numbers of different single trials do.
+
+    Returns:
+        What moves in each run, shape (runs, p), and the run that each coordinate moves in by trial,
+        shape (trials, p); 0 where it changes nothing.
+    """
+    moves = np.zeros((len(coordinates),) * 2, bool)
+    of, taken = np.zeros((trials, len(coordinates)), int), list[set[int]]()
+    for i, coordinate in enumerate(coordinates):
+        here = set(range(trials)) if coordinate.trial is None else {coordinate.trial}
+        run = next((k for k, others in enumerate(taken) if not others & here), len(taken))
+        taken[run:] = [set().union(*taken[run : run + 1], here), *taken[run + 1 :]]
+        moves[run, i] = True
+        of[list(here), i] = run + 1
+    return moves[: len(taken)], of
+
+
 def _damped(
     information: Array, gradient: Array, out: NDArray[np.bool_], damping: float
 ) -> list[Array]:
@@ -233,17 +261,23 @@ def _damped(
 
 
 def _scored(
-    box: GreyBox, results: Sequence[tuple[Array, Array]], signs: Array
+    box: GreyBox,
+    results: Sequence[tuple[Array, Array]],
+    signs: Array,
+    of: NDArray[np.int64],
 ) -> tuple[Array, Array]:
-    """Expected information (p, p) and scores (blocks, p) from runs at and beside a point."""
+    """Expected information (p, p) and scores (blocks, p) from runs at and beside a point.
+
+    `of` is the run of each coordinate by trial, shape (trials, p).
+    """
     slopes, sizes = [], []
     with np.errstate(all="ignore"):
-        for (errors, spreads), trial in zip(results, box.rows, strict=True):
+        for (errors, spreads), trial, runs in zip(results, box.rows, of, strict=True):
             mask = trial.there.ravel()
             e, s = (a.reshape(len(a), -1)[:, mask] for a in (errors, spreads))
             root = np.sqrt(s[0])
-            de = (e[1:] - e[0]) / (signs[:, None] * root)
-            ds = (np.log(s[1:]) - np.log(s[0])) / signs[:, None]
+            de = (e[runs] - e[0]) / (signs[:, None] * root)
+            ds = (np.log(s[runs]) - np.log(s[0])) / signs[:, None]
             bad = ~((np.abs(de) < RUNAWAY) & np.isfinite(ds))
             slopes.append(np.where(bad, 0.0, np.stack([de, ds])))
             white = e[0] / root
