@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from pma_gym.discovery.grey_box.first_fit import SHARES
+from pma_gym.discovery.grey_box.first_fit import LESS, weaker
 from pma_gym.discovery.grey_box.hypothesis import Hypothesis, Move, added_paths, precise_fit
 from pma_gym.discovery.grey_box.prepared_trials import CLOCK, PreparedTrials
 from pma_gym.discovery.grey_box.slots import presliding, quantity_of, slot, values_of
@@ -14,12 +14,9 @@ from pma_gym.effects import CATALOGUE
 from pma_gym.estimation.innovations import TREND, TRIAL, GreyBox, Point, log_likelihood
 from pma_gym.estimation.likelihood_fit import Coordinate, value_of, with_tied, with_values
 
-PARTS, LESS, SLIPS = (0.3, 1.0, 3.0), (0.5, 0.1, 0.02), (0.01, 0.1, 1.0, 10.0, 100.0)
-"""Starts of a candidate.
-
-Times the size that the screening promises, shares of the latent force, and times the usual
-presliding distance.
-"""
+PARTS, SLIPS = (0.3, 1.0, 3.0), (0.01, 0.1, 1.0, 10.0, 100.0)
+"""Starts of a candidate: times the size that the screening promises, and times the usual presliding
+distance."""
 
 FITTED, FURTHER = 1, 2
 """How many of them are fitted, the likeliest as they are, and in a careful fit."""
@@ -29,9 +26,6 @@ AMOUNTS = (-0.5, -0.3, 0.0, 0.3, 0.6, 1.0, 1.5, 2.0, 3.0)
 
 PROMISED = (0.0, 0.5, 1.0, 2.0)
 """Times what the screening promises that a parameter differs by trial where its fits begin."""
-
-CLOCKS = (1e-4, 3e-4, 1e-3, 2e-3, 4e-3, 8e-3, 0.016, 0.03)
-"""Shares by which a clock runs fast or slow where its fits begin."""
 
 MOST_FACTOR = 5.0
 """Factor that a parameter of one trial may differ by.
@@ -44,7 +38,9 @@ def tried(trials: PreparedTrials, now: Hypothesis, move: Move, careful: bool = F
     """Fit with a move added; `careful` from further starts."""
     candidate = move.candidate
     if move.is_nuisance:
-        return _clocked(trials, now, move, careful)
+        start, free = move.start or now.fit.point, [*now.fit.coordinates, CLOCK]
+        made = precise_fit(trials, now.box, start, free, now.fit.tied, rough=not careful)
+        return replace(made, moves=(*now.moves, move), rivals=now.rivals)
     if candidate is None:
         return _varied(trials, now, move, careful)
     box = trials.box(candidate.beside(now.box.model), steps=now.box.rows[0].steps)
@@ -144,7 +140,6 @@ def _varied(trials: PreparedTrials, now: Hypothesis, move: Move, careful: bool) 
     tied_slots = [slot_ for slot_, of in now.fit.tied.items() if of == base]
     tied |= {f"{tied_slot}{mark}{number}": name for tied_slot in tied_slots}
     coordinates = [*now.fit.coordinates, Coordinate(name, scale, False, *bounds)]
-    starts = [weaker(trials, with_values(now.fit.point, with_tied({name: first}, tied)), 0.5)]
     # The likeliest of what it may be beside a share of the latent force.
     differ = [first + times * move.amount * scale for times in PROMISED]
     if odd and mark == TRIAL:
@@ -158,52 +153,14 @@ def _varied(trials: PreparedTrials, now: Hypothesis, move: Move, careful: bool) 
         for share in (1.0, *LESS)
     ]
     likely = log_likelihood(now.box.innovations(here), now.box.rows)
-    starts += [here[i] for i in np.argsort(-likely)[: 1 + careful]]
+    starts = [here[i] for i in np.argsort(-likely)[: 1 + careful]]
+    if careful or mark == TREND:
+        # A trend carries the latent force of all trials.
+        none = with_values(now.fit.point, with_tied({name: first}, tied))
+        starts += [weaker(trials, none, LESS[0])]
     fits = [
         precise_fit(trials, now.box, start, coordinates, tied, rough=not careful)
         for start in starts
     ]
     best = max(fits, key=lambda made: made.fit.value)
     return replace(best, moves=(*now.moves, move), rivals=now.rivals)
-
-
-def _clocked(trials: PreparedTrials, now: Hypothesis, move: Move, careful: bool) -> Hypothesis:
-    """With the clock of the readings free; a careful fit has no further starts.
-
-    From the likeliest errors beside little latent force: what that makes up for shows no slope. And
-    beside the model's own parameters, for fitted ones may have made up for it too.
-    """
-    point, coordinates = now.fit.point, [*now.fit.coordinates, CLOCK]
-    own = with_values(point, with_tied({**point.numbers, **now.box.numbers()}, now.fit.tied))
-    own = replace(own, deviations=tuple(trials.noise), memory=trials.memory[0])
-    known = [(point, LESS[-1] * np.array(point.forces))]
-    known += [] if now.moves else [(own, np.full(len(point.forces), SHARES[0] * trials.force))]
-    starts = [weaker(trials, point, 0.5)]
-    for base, forces in known[: 0 if careful else None]:
-        here = [
-            replace(base, clock=way * error, delay=late * point.delay, forces=tuple(forces))
-            for error in CLOCKS
-            for way in (-1.0, 1.0)
-            for late in (1.0, 0.0)
-        ]
-        likely = log_likelihood(now.box.innovations(here), now.box.rows)
-        starts.append(here[int(np.argmax(likely))])
-    fits = [
-        precise_fit(trials, now.box, start, coordinates, now.fit.tied, rough=not careful)
-        for start in starts
-    ]
-    best = max(fits, key=lambda made: made.fit.value)
-    return replace(best, moves=(*now.moves, move), rivals=now.rivals)
-
-
-def weaker(trials: PreparedTrials, point: Point, share: float) -> Point:
-    """A point with a share of its latent force, in no trial more than thrice the least one.
-
-    And with no more noise than the readings show: what stood in for an effect makes room for
-    it.
-    """
-    most = 3.0 * min(point.forces) if share < 1.0 else max(point.forces)
-    least = min(SHARES) * trials.force
-    forces = tuple(max(share * min(each, most), least) for each in point.forces)
-    noise = tuple(map(min, point.deviations, trials.noise))
-    return replace(point, forces=forces, deviations=noise)

@@ -144,7 +144,7 @@ class EffectSelection:
         self, screening: Screening, beam: Sequence[list[Hypothesis]], step: str
     ) -> list[list[Hypothesis]]:
         """Every chain with each of its most promising moves, the likeliest for its price first."""
-        seen, chains = set[tuple[frozenset[str], bool]](), list[list[Hypothesis]]()
+        seen, chains = set[tuple[frozenset[str], float]](), list[list[Hypothesis]]()
         plans = [
             (chain, move)
             for rank, chain in enumerate(beam)
@@ -154,7 +154,8 @@ class EffectSelection:
         self.planned = int(AFTER * costs[-1])
         for (chain, move), done in zip(plans, costs.tolist(), strict=False):
             now = chain[-1]
-            key = frozenset(each.name for each in (*now.moves, move)), move.start is not None
+            names = frozenset(each.name for each in (*now.moves, move))
+            key = names, move.promise if move.start else 0.0
             if key in seen:
                 continue
             seen.add(key)

@@ -8,16 +8,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
+from pma_gym.discovery.grey_box.first_fit import LESS, SHARES
 from pma_gym.discovery.grey_box.hypothesis import Hypothesis, Move, added_paths
 from pma_gym.discovery.grey_box.latent_law import line_over_position
 from pma_gym.discovery.grey_box.prepared_trials import CLOCK, PreparedTrials
 from pma_gym.discovery.grey_box.slots import gains_of_drive, quantity_of, slot, values_of
-from pma_gym.discovery.grey_box.thresholds import LEAST_TRIALS, ODD, TRIED
-from pma_gym.estimation.innovations import TREND, TRIAL
+from pma_gym.discovery.grey_box.thresholds import LEAST_TRIALS, LIKE, ODD, TRIED
+from pma_gym.estimation.innovations import TREND, TRIAL, log_likelihood
 from pma_gym.estimation.likelihood_fit import OTHERS, STEP, Coordinate, with_tied, with_values
 from pma_gym.estimation.smoother import smoothed
 
 Array = NDArray[np.float64]
+
+CLOCKS = (1e-4, 3e-4, 1e-3, 2e-3, 4e-3, 8e-3, 0.016, 0.03)
+"""Shares by which a clock runs fast or slow where its fits begin."""
 
 NOTHING = 1e-9
 """Square of a change, in noises, that is none: rounding."""
@@ -43,9 +47,10 @@ class Screening:
         """The moves that promise half their price.
 
         Where there is a latent force, the first ones whatever they promise, and those that it may
-        hide (`_beside`).
+        hide (`_beside`, `_clocks`).
         """
         moves, bent = self._moves(now), self.trials.is_bent(now.fit.point)
+        clocks = self._clocks(now) if bent else []
         if bent and not now.moves:
             # A model that lacks much is bent by its fit: its lack is looked for from the model as
             # it came too.
@@ -55,11 +60,11 @@ class Screening:
                 if move.candidate
             ]
             moves = [*moves[:TRIED], *fresh[:TRIED], *moves[TRIED:]]
-            return moves[: 2 * TRIED] + _beside(now, moves, 2 * TRIED)
+            return moves[: 2 * TRIED] + _beside(now, moves, 2 * TRIED) + clocks
         price = 0.5 * (0.5 * np.log(now.readings) + np.log(len(moves)))
         if not bent:
             return [move for move in moves[:TRIED] if move.promise > price]
-        return moves[:TRIED] + _beside(now, moves, TRIED)
+        return moves[:TRIED] + _beside(now, moves, TRIED) + clocks
 
     def _moves(self, now: Hypothesis) -> list[Move]:
         """All that may be added, by what it promises less its price, the most first."""
@@ -70,10 +75,8 @@ class Screening:
             for name in gains_of_drive(self.trials.model)
             if name not in own
         ]
-        clock = [] if CLOCK.name in own else [CLOCK]
         mean = [
             *drive,
-            *clock,
             *(c for c in fitted.coordinates if " " not in c.name and c.name != "memory"),
         ]
         beside = [
@@ -84,7 +87,7 @@ class Screening:
         ]
         white = self.trials.white(box, [fitted.point, *beside])
         error, slopes = white[0], np.nan_to_num((white[1:] - white[0]) / STEP)
-        basis = np.linalg.qr(slopes[len(drive) + len(clock) :].T)[0]
+        basis = np.linalg.qr(slopes[len(drive) :].T)[0]
 
         def beyond(rows: Array) -> Array:
             return rows - (rows @ basis) @ basis.T
@@ -94,10 +97,35 @@ class Screening:
             *self._effects(now, error, left, beyond),
             *_by_trial(now, mean, slopes, left, beyond),
         ]
-        for each, slope in zip(clock, slopes[len(drive) :], strict=False):
-            moves += _varying(each.name, slope, left, beyond)
         price = 0.5 * np.log(len(error))
         return sorted(moves, key=lambda move: move.numbers * price - move.promise)
+
+    def _clocks(self, now: Hypothesis) -> list[Move]:
+        """The readings' clock, where an error of it is likelier than none beside little force.
+
+        What a latent force makes up for shows no slope, and fitted parameters may have made up for
+        it too: it is looked for on a grid, beside these and those of the model as it came.
+        """
+        if any(c.name == CLOCK.name for c in now.fit.coordinates):
+            return []
+        point, unmoved, moves = now.fit.point, self.unmoved.fit.point, []
+        bases = [replace(point, forces=tuple(LESS[-1] * force for force in point.forces))]
+        if not now.moves:
+            forces = (SHARES[0] * self.trials.force,) * len(point.forces)
+            noise, memory = tuple(self.trials.noise), self.trials.memory[0]
+            bases += [replace(unmoved, forces=forces, deviations=noise, memory=memory)]
+        for base in bases:
+            here = [
+                replace(base, clock=error, delay=late * point.delay)
+                for error in (0.0, *CLOCKS, *(-error for error in CLOCKS))
+                for late in (1.0, 0.0)
+            ]
+            likely = log_likelihood(now.box.innovations(here), now.box.rows)
+            best = int(np.argmax(likely))
+            gain = float(likely[best] - likely[:2].max())
+            if gain > now.price_of(1) + LIKE:
+                moves += [Move(CLOCK.name, gain, 1, slots=(CLOCK.name,), start=here[best])]
+        return moves
 
     def _effects(
         self, now: Hypothesis, error: Array, left: Array, beyond: Callable[[Array], Array]
@@ -194,7 +222,7 @@ def _varying(name: str, column: Array, left: Array, beyond: Callable[[Array], Ar
 def _beside(now: Hypothesis, moves: Sequence[Move], first: int) -> list[Move]:
     """Further moves behind the first ones.
 
-    The clock, each parameter of the trial whose latent force stands out, and each that may differ
+    Each parameter of the trial whose latent force stands out, and each that may differ
     as the most promising one does: in that trial, or from trial to trial. A drive's gain that falls
     is a friction, an inertia and a damping that rise, and none of these promises as much as all.
     """
@@ -202,15 +230,6 @@ def _beside(now: Hypothesis, moves: Sequence[Move], first: int) -> list[Move]:
     odd = int(np.argmax(forces))
     alone = len(forces) >= LEAST_TRIALS and forces[odd] > ODD * float(np.median(forces))
     ends = [f"{TRIAL}{odd}"] if alone else []
-    marks = (re.split(f"(?=[{TREND}{TRIAL}])", m.name)[-1] for m in moves[:first] if _differs(m))
+    marks = (re.split(f"(?=[{TREND}{TRIAL}])", m.name)[-1] for m in moves[:first] if m.slots)
     ends += [*marks][:1]
-    return [
-        m
-        for m in moves[first:]
-        if m.is_nuisance or _differs(m) and any(m.name.endswith(end) for end in ends)
-    ]
-
-
-def _differs(move: Move) -> bool:
-    """Whether it is a parameter that differs by trial."""
-    return bool(move.slots) and not move.is_nuisance
+    return [m for m in moves[first:] if m.slots and any(m.name.endswith(end) for end in ends)]

@@ -7,8 +7,8 @@ from itertools import product
 import numpy as np
 
 from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
-from pma_gym.discovery.grey_box.effect_fits import SLIPS, tried, weaker
-from pma_gym.discovery.grey_box.first_fit import SHARES, hold_fits
+from pma_gym.discovery.grey_box.effect_fits import SLIPS, tried
+from pma_gym.discovery.grey_box.first_fit import SHARES, hold_fits, weaker
 from pma_gym.discovery.grey_box.hypothesis import Hypothesis, Move, precise_fit
 from pma_gym.discovery.grey_box.prepared_trials import PreparedTrials
 from pma_gym.discovery.grey_box.slots import quantity_of, slot, values_of
@@ -92,10 +92,15 @@ def other_hold(trials: PreparedTrials, now: Hypothesis) -> Hypothesis:
 
 
 def trend_instead(trials: PreparedTrials, now: Hypothesis) -> Hypothesis:
-    """With a trend in place of several values that a parameter has by trial, or beside a trend."""
+    """With a trend in place of values that a parameter has by trial.
+
+    Of several, or one beside a trend, where all trials' values lie on a line; of one where that is
+    likelier.
+    """
     slots = [slot_ for move in now.moves for slot_ in move.slots]
     of = [slot_.partition(TRIAL)[0].removesuffix(TREND) for slot_ in slots]
-    for base in {each for each in of if of.count(each) > 1}:
+    alone = {name.partition(TRIAL)[0] for name in slots if TRIAL in name}
+    for base in {each for each in of if each in alone}:
         marked = f"{base}{TRIAL}", f"{base}{TREND}"
         gone = {name for name in now.fit.point.numbers if name.startswith(marked)}
         gone |= {slot_ for slot_, name in now.fit.tied.items() if name in gone}
@@ -110,9 +115,12 @@ def trend_instead(trials: PreparedTrials, now: Hypothesis) -> Hypothesis:
         order, numbered = now.box.order, range(len(now.box.rows))
         values = [value_in_trial(now.fit.point, base, i, order) for i in numbered]
         off = values - np.polyval(np.polyfit(order, values, 1), order)
-        if np.abs(off).max() < LINE * np.ptp(values):
+        is_line, one = np.abs(off).max() < LINE * np.ptp(values), of.count(base) == 1
+        if one or is_line:
             move = Move(f"{base}{TREND}", 0.0, 1, slots=(f"{base}{TREND}",))
-            now = tried(trials, Hypothesis(now.box, less, kept, now.rivals), move, careful=True)
+            begin = Hypothesis(now.box, less, kept, now.rivals)
+            made = tried(trials, begin, move, careful=True)
+            now = now if one and made.fit.value < now.fit.value else made
     return now
 
 

@@ -2,12 +2,15 @@
 
 from types import SimpleNamespace
 
-from pma_gym.discovery.grey_box.hypothesis import Move
-from pma_gym.discovery.grey_box.moves import _beside
+import numpy as np
+
+from pma_gym.discovery.grey_box.hypothesis import Hypothesis, Move
+from pma_gym.discovery.grey_box.moves import Screening, _beside
+from pma_gym.estimation.innovations import Point
 
 
 def move(name):
-    """A parameter that differs by trial, or a clock."""
+    """A parameter that differs by trial."""
     return Move(name, 0.0, 1, slots=(name,))
 
 
@@ -35,5 +38,33 @@ def test_the_trial_whose_latent_force_stands_out_has_each_of_its_parameters_fitt
     assert names((1.0, 1.1, 9.0), *moves) == ["slide.mass@2", "two_way_drive.gain@2"]
 
 
-def test_a_clock_is_always_fitted_for_a_latent_force_hides_its_slope():
-    assert names(EVEN, "slide.mass~", "slide.mass@2", "clock") == ["clock"]
+class Filter:
+    """Innovations of 200 readings that an error of the clock makes larger."""
+
+    def __init__(self, true):
+        self.true, self.rows = true, [SimpleNamespace(there=np.ones((200, 1), bool))]
+
+    def innovations(self, points):
+        off = np.array([1.0 + abs(each.clock - self.true) / 1e-3 for each in points])
+        errors = off[:, None, None] * np.ones((1, 200, 1))
+        return [(errors, np.ones_like(errors))]
+
+
+def clocks(true):
+    """Moves of the clock where readings run fast by a share."""
+    point = Point({}, (1.0,), (5.0,), 0.1)
+    fit = SimpleNamespace(point=point, coordinates=(), tied={})
+    trials = SimpleNamespace(force=1.0, noise=[1.0], memory=(0.1, 1.0))
+    now = Hypothesis(Filter(true), fit)
+    return Screening(trials, (), SimpleNamespace(fit=fit), print)._clocks(now)
+
+
+def test_a_clock_that_runs_fast_is_fitted_from_there_beside_little_latent_force():
+    for move_ in (made := clocks(0.002)):
+        assert move_.start.clock == 0.002
+        assert move_.is_nuisance and move_.promise > 100.0
+    assert [each.start.forces for each in made] == [(0.02 * 5.0,), (0.1,)]
+
+
+def test_a_clock_that_no_error_makes_likelier_is_not_fitted():
+    assert clocks(0.0) == []
