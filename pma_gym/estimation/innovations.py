@@ -337,7 +337,6 @@ class GreyBox:
         rows: the trials.
         channels: signals that are read.
         threads: that run at once, over trials and parameter vectors; the bits are the same.
-        finest: standard deviation of a reading of the position (SI); 0 where none is read.
     """
 
     def __init__(
@@ -346,9 +345,8 @@ class GreyBox:
         rows: Sequence[Rows],
         channels: Sequence[int],
         threads: int = 1,
-        finest: float = 0.0,
     ) -> None:
-        self.threads, self.finest = threads, finest
+        self.threads = threads
         self.model, self.rows, self.channels = model, list(rows), tuple(channels)
         self.kernel = kernel(model, channels)
         self.order: Array = np.arange(float(len(rows))) - 0.5 * (len(rows) - 1)

@@ -62,7 +62,7 @@ def tried(trials: PreparedTrials, now: Hypothesis, move: Move, careful: bool = F
                 quantity_of(slot(path)).to_si(float(v)) for v in (0.0, far, low, high)
             )
             more.append(Coordinate(slot(path), abs(size - zero) or 1.0, False, least, most))
-    more += [presliding(candidate.effect, box)] if "presliding" in law.scanned else []
+    more += [presliding(candidate.effect)] if "presliding" in law.scanned else []
     here = move.start or now.fit.point
     whole = replace(here, numbers={**box.numbers(), **here.numbers})
     sized = [slot(p) for p, size in zip(candidate.paths, candidate.amplitudes, strict=True) if size]

@@ -178,8 +178,7 @@ class PreparedTrials:
             how = self.channels, steps, linear, self.block, self.stride, self.coarse
             noise = self.noise if rugged else ()
             self._rows[key] = [Rows(each, *how, not rugged, noise) for each in self.logged]
-        finest = self.noise[0] if self.channels[0] == 0 else 0.0
-        return GreyBox(model, self._rows[key], self.channels, self.threads, finest)
+        return GreyBox(model, self._rows[key], self.channels, self.threads)
 
     def precise(
         self,

@@ -100,11 +100,11 @@ def own_coordinates(box: GreyBox) -> tuple[list[Coordinate], dict[str, str]]:
             Coordinate(name, scale, inertial, lower, upper, 1.0 if inertial else spread / scale)
         )
     for effect in model.effects.values():
-        coordinates += [presliding(effect.name, box)] if "presliding" in effect.scanned else []
+        coordinates += [presliding(effect.name)] if "presliding" in effect.scanned else []
     return coordinates, tied
 
 
-def presliding(effect: str, box: GreyBox) -> Coordinate:
+def presliding(effect: str) -> Coordinate:
     """How far a contact gives before it slides, which no list of parameters has free."""
     quantity = quantity_of(f"{effect}.presliding")
     low, high = quantity.to_si(quantity.lower), quantity.to_si(quantity.upper)

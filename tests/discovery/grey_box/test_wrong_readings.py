@@ -120,6 +120,25 @@ def test_readings_without_hum_have_no_line():
         assert not without_hum(PreparedTrials(made, every, 1)).hums
 
 
+def test_mains_at_half_the_rate_of_the_readings_hum_though_they_move_more_elsewhere():
+    """The line is the last of the spectrum, one of its waves is none, and a motion is louder."""
+    trials = []
+    for i, trial in enumerate(moved("slide")):
+        noise = NOISE["slide"] * np.random.default_rng(i).standard_normal(len(trial.time))
+        half = 0.5 / (trial.time[1] - trial.time[0])
+        hum = 2e-4 * np.sin(2.0 * np.pi * (half - 0.005) * trial.time + 2.0)
+        read = trial.measurements["contraction"] + noise + hum
+        trials.append(replace(trial, measurements={"contraction": read}))
+    made = rigs.model("slide")
+    every = [Logged.of(made, i, trial) for i, trial in enumerate(trials)]
+    hums = without_hum(PreparedTrials(made, every, 1)).hums
+    print([(h.hertz, h.amplitude) for h in hums], [len(t.time) for t in trials])
+    (hum,) = hums
+    assert hum.hertz == pytest.approx(half, abs=0.1)
+    # Its phase is nearly that of the start: of 2e-4 m they show the sine of 2.
+    assert np.ptp(hum.of(0, trials[0].time[:2])) == pytest.approx(2.0 * 2e-4 * np.sin(2.0), rel=0.1)
+
+
 def test_a_hum_is_taken_out_of_averaged_rows_too():
     """Where several readings are one row, which hums less than they do."""
     time = np.arange(60_000) * 1e-3
