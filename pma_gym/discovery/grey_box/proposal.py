@@ -18,7 +18,6 @@ from pma_gym.discovery.grey_box.slots import gains_of_drive, quantity_of, slot
 from pma_gym.discovery.grey_box.thresholds import FAR, LIKE, NOISES, SMALL
 from pma_gym.discovery.result.misfit import rms
 from pma_gym.discovery.thresholds import COMPLETE, SURE
-from pma_gym.estimation.innovations import is_rugged
 from pma_gym.estimation.likelihood_fit import OTHERS, value_of, with_tied, with_values
 
 Array = NDArray[np.float64]
@@ -127,12 +126,11 @@ class Proposal:
         if not self.candidates or not any(c.name == "delay" for c in last.fit.coordinates):
             return 0.0
         late, error = last.fit.point.delay, last.fit.deviations["delay"]
-        trials = self.selection.trials
-        # How an incomplete model's commands run between rows is not known to less than a row, and
-        # when friction turns to less than a step.
-        unknown = trials.span / last.box.rows[0].steps if is_rugged(last.box.model) else 0.0
-        if self.predictions.misfit(last) > COMPLETE:
-            unknown = trials.span / trials.stride / trials.block
+        row = (
+            self.selection.trials.span / self.selection.trials.stride / self.selection.trials.block
+        )
+        # How an incomplete model's commands run between rows is not known to less than a row.
+        unknown = 0.0 if self.predictions.misfit(last) < COMPLETE else row
         if late < max(unknown, SURE * error):
             return 0.0
         price = np.log(len(self.candidates)) + last.price_of(1)
