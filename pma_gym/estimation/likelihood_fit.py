@@ -72,8 +72,8 @@ class Coordinate:
     @property
     def trial(self) -> int | None:
         """Number of the only trial that it changes; None if it changes all."""
-        kind, _, number = self.name.partition(" ")
-        alone = number if kind == "force" else self.name.partition(TRIAL)[2]
+        latent = self.name.startswith("force ")
+        alone = self.name.removeprefix("force ") if latent else self.name.partition(TRIAL)[2]
         return int(alone) if alone else None
 
     def of(self, point: Point) -> float:
@@ -218,8 +218,7 @@ def fit(
         if gain > 0.0:
             x, best = steps[at], float(values[at])
             damping = float(np.clip(damping * 10.0 ** (at - 2), 1e-6, 1e3))
-        if not gain > least:
-            sizes = sizes[1:]
+        sizes = sizes if gain > least else sizes[1:]
         if not sizes:
             break
     return Fit(point(x), best, tuple(coordinates), dict(tied), information, scores)
