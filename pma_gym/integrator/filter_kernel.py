@@ -8,9 +8,9 @@ Between two rows mean and covariance move together in short steps of the Rosenbr
 
 Dry friction is the bristle of the catalogue: while it sticks it is a stiff spring, which takes the
 variance of the speed away by itself. J has its slope over the way of the step. A step in which a
-slipping mass comes to rest ends there, and what is left of it begins with steps that are short
-enough for the bristle to give way: friction acts for none of the time in the old direction. At a
-row the readings correct mean and covariance one after the other.
+slipping mass comes to rest, or a held one breaks away, is divided there. What is left of it begins
+with steps that are short enough for the bristle to give way, so that friction does not act in the
+old direction after the stop. At a row the readings correct mean and covariance one after the other.
 
 Source:
     J. G. Verwer, E. J. Spee, J. G. Blom, W. Hundsdorfer 1999, "A second-order Rosenbrock method
@@ -54,17 +54,18 @@ FULL = 0.9999
 POLE = 1.0 - 0.5**0.5
 
 FAR = 1.0
-"""Way (m, rad) after which every bristle slips."""
+"""Way (m, rad) after which every bristle slips: far beyond any presliding distance."""
 
 LEAST_WAY = 1e-12
 """Way (m, rad) over which the slope of friction is taken at least."""
 
 SLIPPING = 0.9
-"""Deflection of a bristle from which on its mass slips: it comes to rest, and nothing held it."""
+"""Deflection of a bristle from which on its mass slips; below it is held. Assumption: bristles
+begin to slip at 0.7, and all slip at 1."""
 
 AFTER = 12
-"""Steps after the mass came to rest: the first two are the shortest, each further one is twice as
-long as the one before."""
+"""Steps after the mass came to rest: the first two are the shortest, a 2048th of what is left; each
+further one is twice as long as the one before."""
 
 Entry = Value | None
 
@@ -111,9 +112,12 @@ class FilterEquations:
         self.correction = self._corrected()
 
     def _stop(self) -> tuple[Value | None, Value]:
-        """Whether a slipping mass stops within a step, or a held one slips; at which share of it.
+        """Whether a slipping mass stops within a step, or a held one breaks away, and where.
 
-        A held one slips where a bristle that gave way as at the start would bend beyond its end.
+        A held one breaks away where its bristle, as stiff as at the start, would bend beyond 1.
+
+        Returns:
+            The truth, None without dry friction; and the share of the step until then.
         """
         eq, one = self.eq, self.eq.graph.constant(1.0)
         held = [m for m in eq.rate_independent_states if m.name in self.bristles]
@@ -477,7 +481,7 @@ def write_filter(module: Module, made: FilterEquations, width: int, keeps: bool)
 def _parts(
     b: Builder, simd: SimdEmitter, made: FilterEquations, whole: Operand
 ) -> Iterator[tuple[Operand, Callable[[dict[int, Operand]], Operand | None]]]:
-    """Write a step once, which ends where a mass stops and goes on in short ones in such lanes.
+    """Write a step once; in lanes in which a mass stops it ends there, and short ones follow.
 
     Yields the length of a part, and a function that is called with what was emitted of it and gives
     the lanes in which it counts; None for all.

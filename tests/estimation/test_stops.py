@@ -48,7 +48,7 @@ def test_a_mass_that_coasts_stops_where_its_energy_ends_and_stays(steps):
 
 @pytest.mark.parametrize("steps", [1, 4])
 def test_a_mass_that_turns_has_friction_in_the_old_direction_until_then_alone(steps):
-    """From 0.1 s on 30 N stop it in 0.0375 s; friction for a step too long would cost 0.4 m."""
+    """From 0.1 s on 30 N stop it in 0.0375 s; friction to the end of the step cost 1.2 m."""
     back, now = ROWS - 0.1375, ROWS - 0.1
     there = np.where(back < 0.0, 0.04 + 0.3 * now - 4.0 * now**2, 0.045625 - 2.0 * back**2)
     there[ROWS < 0.1] = (0.5 * ROWS - ROWS**2)[ROWS < 0.1]

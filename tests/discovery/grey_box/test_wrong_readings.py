@@ -131,9 +131,7 @@ def test_mains_at_half_the_rate_of_the_readings_hum_though_they_move_more_elsewh
         trials.append(replace(trial, measurements={"contraction": read}))
     made = rigs.model("slide")
     every = [Logged.of(made, i, trial) for i, trial in enumerate(trials)]
-    hums = without_hum(PreparedTrials(made, every, 1)).hums
-    print([(h.hertz, h.amplitude) for h in hums], [len(t.time) for t in trials])
-    (hum,) = hums
+    (hum,) = without_hum(PreparedTrials(made, every, 1)).hums
     assert hum.hertz == pytest.approx(half, abs=0.1)
     # Its phase is nearly that of the start: of 2e-4 m they show the sine of 2.
     assert np.ptp(hum.of(0, trials[0].time[:2])) == pytest.approx(2.0 * 2e-4 * np.sin(2.0), rel=0.1)
