@@ -13,6 +13,7 @@ from typing import Annotated, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from pma_gym.codegen.graph import FIXED
 from pma_gym.codegen.machine.control import Module
 from pma_gym.codegen.machine.native import compiled, simd_lanes
 from pma_gym.effects.effect import Effect
@@ -29,7 +30,7 @@ from pma_gym.units import Quantity
 
 Array = NDArray[np.float64]
 
-LATENT = "latent_force"
+LATENT, COLOUR = "latent_force", "colour"
 
 PORTS = {"slide": "slide_force", "joint": "joint_torque"}
 """Where the latent force acts, by rig: drive and load act on one mass, so they are one place."""
@@ -84,36 +85,44 @@ class Kernel:
         return n + n * (n + 1) // 2
 
 
-def equations(model: Model, channels: Sequence[int]) -> FilterEquations:
-    """The filter's arithmetic for a model and the signals that are read."""
+def equations(model: Model, channels: Sequence[int], coloured: bool = False) -> FilterEquations:
+    """The filter's arithmetic for a model and the signals that are read.
+
+    Whether the first of them has coloured noise too: one with a memory, drift if that is long.
+    """
     latent = Effect(LATENT, PORTS[model.plant], LatentForce, law=_force, rate=_decay)
     eq = PlantEquations(
         {**model.effects, LATENT: latent}, {**model.parameters, LATENT: LatentForce(1.0)}, "zoh"
     )
     model.rig.write_equations(eq)
-    eq.finish()
+    noisy = {f"memory_{LATENT}": "process_noise"}
     readings = [eq.readings[model.rig.signals[channel].name] for channel in channels]
+    if coloured:
+        noisy[COLOUR] = f"{COLOUR}_noise"
+        eq.add_state(COLOUR, -eq[COLOUR] / eq.graph.input(f"{COLOUR}_memory", FIXED), None)
+        readings[0] = readings[0] + eq[COLOUR]
+    eq.finish()
     bristles = [
         n
         for e in model.effects.values()
         if e.rate_independent_law is friction_path
         for n in e.memory_names
     ]
-    return FilterEquations(eq, f"memory_{LATENT}", readings, bristles)
+    return FilterEquations(eq, noisy, readings, bristles)
 
 
 _kernels: dict[tuple[str, ...], Kernel] = {}
 
 
-def kernel(model: Model, channels: Sequence[int], keeps: bool = False) -> Kernel:
-    """The compiled filter of a model's structure.
-
-    One that keeps what a smoother needs has one lane.
-    """
+def kernel(
+    model: Model, channels: Sequence[int], coloured: bool = False, keeps: bool = False
+) -> Kernel:
+    """The compiled filter of a model's structure; of `keeps`, for a smoother, with one lane."""
     width = 1 if keeps else simd_lanes()
-    key = ("grey box", *structure(model), *map(str, channels), str(width), str(keeps))
+    how = (*channels, width, keeps, *([COLOUR] if coloured else []))
+    key = ("grey box", *structure(model), *map(str, how))
     if key not in _kernels:
-        made = equations(model, channels)
+        made = equations(model, channels, coloured)
 
         def build() -> Module:
             module = Module()
@@ -138,6 +147,8 @@ class Point:
         memory: how long it remembers (s).
         delay: of the command (s).
         clock: share by which the readings' clock runs fast beside that of the commands.
+        colour: standard deviation of the first read signal's coloured noise (SI); 0 for none.
+        colour_memory: how long that remembers (s).
     """
 
     numbers: Mapping[str, float]
@@ -146,6 +157,13 @@ class Point:
     memory: float
     delay: float = 0.0
     clock: float = 0.0
+    colour: float = 0.0
+    colour_memory: float = 1.0
+
+    @property
+    def noises(self) -> tuple[float, ...]:
+        """Standard deviation of each read signal's noise, white and coloured (SI)."""
+        return hypot(self.deviations[0], self.colour), *self.deviations[1:]
 
     @property
     def pace(self) -> float:
@@ -348,7 +366,6 @@ class GreyBox:
     ) -> None:
         self.threads = threads
         self.model, self.rows, self.channels = model, list(rows), tuple(channels)
-        self.kernel = kernel(model, channels)
         self.order: Array = np.arange(float(len(rows))) - 0.5 * (len(rows) - 1)
 
     def numbers(self) -> dict[str, float]:
@@ -359,7 +376,8 @@ class GreyBox:
         self, points: Sequence[Point], rows: Sequence[Rows] | None = None
     ) -> list[tuple[Array, Array]]:
         """Innovations and their variances of each trial, shape (points, rows, signals) each."""
-        width, trials = self.kernel.width, list(rows or self.rows)
+        k = kernel(self.model, self.channels, any(point.colour for point in points))
+        width, trials = k.width, list(rows or self.rows)
         results = [
             (np.empty(shape), np.empty(shape))
             for shape in [(len(points), len(t.time), len(self.channels)) for t in trials]
@@ -369,10 +387,10 @@ class GreyBox:
             some = list(points[first : first + width])
             filled = some + [some[-1]] * (width - len(some))
             trial = trials[number]
-            arguments = self._arguments(self.kernel, number, trial, filled)
-            out = self._run(self.kernel, trial, filled, arguments)
+            arguments = self._arguments(k, number, trial, filled)
+            out = self._run(k, trial, filled, arguments)
             if trial.finer is not None:
-                out = _extrapolated(out, self._run(self.kernel, trial.finer, filled, arguments))
+                out = _extrapolated(out, self._run(k, trial.finer, filled, arguments))
             for i, into in enumerate(results[number]):
                 into[first : first + width] = np.moveaxis(out[:, :, i, : len(some)], -1, 0)
 
@@ -383,7 +401,7 @@ class GreyBox:
 
     def kept(self, number: int, point: Point) -> Kept:
         """Means, covariances and transitions of one trial."""
-        k = kernel(self.model, self.channels, keeps=True)
+        k = kernel(self.model, self.channels, bool(point.colour), keeps=True)
         n, s, trial = len(k.states), k.size, self.rows[number].finer or self.rows[number]
         room = np.empty((len(trial.time), 2 * s + n * n))
         self._run(k, trial, [point], self._arguments(k, number, trial, [point]), room)
@@ -434,6 +452,8 @@ class GreyBox:
         own = {
             f"{LATENT}.memory_time": point.memory,
             "process_noise": 2.0 * point.forces[number] ** 2 / point.memory,
+            f"{COLOUR}_noise": 2.0 * point.colour**2 / point.colour_memory,
+            f"{COLOUR}_memory": point.colour_memory,
             "pace": point.pace,
         }
         own |= {f"variance {i}": value**2 for i, value in enumerate(point.deviations)}
@@ -464,6 +484,7 @@ class GreyBox:
             position: "position",
             SPEEDS[self.model.plant]: "speed",
             f"memory_{LATENT}": "force",
+            COLOUR: "colour",
             f"lag_{signals[0].sensor}": "position",
             f"lag_{signals[1].sensor}": "speed",
         }
@@ -488,6 +509,7 @@ class GreyBox:
             "position": (first, level),
             "speed": (motion, spread),
             "force": (0.0, point.forces[number]),
+            "colour": (0.0, point.colour),
             "asked": (self.asked(trial.first), 0.0),
             "way": (0.0, way),
             "bristle": (0.0, BRISTLE),

@@ -45,7 +45,7 @@ WIDEST = 3.0
 BLOCKS = 60
 """Pieces of all readings whose scores are taken as independent of each other, for the intervals."""
 
-OTHERS = ("memory", "delay", "clock")
+OTHERS = ("memory", "delay", "clock", "colour", "colour_memory")
 """Numbers of a point that are no parameters of its model."""
 
 

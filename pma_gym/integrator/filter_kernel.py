@@ -76,13 +76,13 @@ class FilterEquations:
 
     Args:
         eq: the rig's equations, the latent force among its effects.
-        noisy: name of the state that process noise drives.
+        noisy: by the name of a state that process noise drives, the name of its intensity.
         readings: the value that each sensor reads.
         bristles: names of memories that are deflections of bristles, between -1 and 1.
     """
 
     eq: Equations
-    noisy: str
+    noisy: Mapping[str, str]
     readings: Sequence[Value]
     bristles: Sequence[str] = ()
     frozen: dict[int, Value] = field(init=False)
@@ -102,7 +102,7 @@ class FilterEquations:
         }
         self.length = graph.input("substep", CHANGING)
         self.true_length = self.length * graph.input("pace", FIXED)
-        self.drive = graph.input("process_noise", FIXED)
+        self.drives = {state: graph.input(name, FIXED) for state, name in self.noisy.items()}
         self.variances = [graph.input(f"variance {i}", FIXED) for i in range(len(self.readings))]
         self.read = [graph.input(f"reading {i}", CHANGING) for i in range(len(self.readings))]
         self.counts = [graph.input(f"counts {i}", CHANGING) for i in range(len(self.readings))]
@@ -278,9 +278,9 @@ class FilterEquations:
         n, zero = len(self.mean), self.eq.graph.constant(0.0)
         # Half of the noise before the step and half after it: of order 2, as the step is.
         added = {
-            (i, i): 0.5 * self.drive * self.true_length
+            (i, i): 0.5 * self.drives[state.name] * self.true_length
             for i, state in enumerate(self.states)
-            if state.name == self.noisy
+            if state.name in self.drives
         }
         half = []
         for row in self.transition:

@@ -3,7 +3,7 @@
 from functools import cache
 
 import numpy as np
-from scipy.linalg import expm
+from scipy.linalg import block_diag, expm
 
 from pma_gym.data.trial import Trial
 from pma_gym.effects import CATALOGUE
@@ -105,19 +105,22 @@ def begun(trial, channels, force):
     return np.array([first, speed, 0.0, first, speed]), np.diag(np.square(deviations))
 
 
-def kalman(trial, channels, force=2.0, memory=0.1):
-    """Innovations, their variances (rows, signals), log likelihood and what a record is made of."""
+def kalman(trial, channels, force=2.0, memory=0.1, colour=0.0, fades=1.0):
+    """Innovations, their variances (rows, signals) and the log likelihood."""
     mean, p = begun(trial, channels, force)
+    mean, p = np.append(mean, 0.0), block_diag(p, colour**2)
     read = np.stack([trial.measurements[n] for n in ("contraction", "velocity")], axis=1)
     errors, spreads = np.empty((2, len(trial.time), len(channels)))
     total = 0.0
     for k in range(len(trial.time)):
         if k:
             phi, gamma, q = matrices(force, memory, trial.time[k] - trial.time[k - 1])
-            mean = phi @ mean + gamma * trial.commands["load_command"][k - 1]
+            kept = np.exp(-(trial.time[k] - trial.time[k - 1]) / fades)
+            phi, q = block_diag(phi, kept), block_diag(q, colour**2 * (1.0 - kept**2))
+            mean = phi @ mean + np.append(gamma, 0.0) * trial.commands["load_command"][k - 1]
             p = phi @ p @ phi.T + q
         for i, channel in enumerate(channels):
-            h = np.eye(5)[3 + channel]
+            h = np.eye(6)[3 + channel] + np.eye(6)[5] * (i == 0)
             s = h @ p @ h + NOISES[channel] ** 2
             e = read[k, channel] - h @ mean
             errors[k, i], spreads[k, i] = e, s

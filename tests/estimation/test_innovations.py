@@ -17,11 +17,12 @@ NO_FORCE = 1e-9
 """Deviation (N, N m) of a latent force that moves nothing."""
 
 
-def errors_of(trial, channels, steps, force):
+def errors_of(trial, channels, steps, force, colour=0.0, fades=1.0):
     """How far innovations, variances and log likelihood are from the exact filter's, in shares."""
     made = box([trial], slide(speed=1 in channels), channels, steps)
-    ((errors, spreads),) = made.innovations([point(made, force)])
-    e, s, total = kalman(trial, channels, force)
+    here = replace(point(made, force), colour=colour, colour_memory=fades)
+    ((errors, spreads),) = made.innovations([here])
+    e, s, total = kalman(trial, channels, force, colour=colour, fades=fades)
     there = np.isfinite(e)
     value = log_likelihood([(errors, spreads)], made.rows)[0]
     return [
@@ -36,6 +37,13 @@ def errors_of(trial, channels, steps, force):
 def test_innovations_and_likelihood_are_those_of_the_exact_filter(channels, uneven):
     trial, _ = logged(uneven=uneven, missing=uneven)
     assert max(errors_of(trial, channels, 128, 2.0)) < 1e-3
+
+
+@pytest.mark.parametrize("fades", [0.02, 5.0])
+@pytest.mark.parametrize("channels", [(0,), (0, 1)])
+def test_coloured_noise_and_drift_are_those_of_the_exact_filter(channels, fades):
+    trial, _ = logged()
+    assert max(errors_of(trial, channels, 128, 2.0, 3.0 * NOISES[0], fades)) < 1e-3
 
 
 def test_without_a_latent_force_halved_steps_leave_a_quarter_of_the_error():

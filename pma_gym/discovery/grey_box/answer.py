@@ -45,7 +45,7 @@ def diagnosis(conclusions: Conclusions, propose: bool) -> Diagnosis:
         value, step = (
             v / SI_FACTORS[column.unit]
             for v in (
-                base.fit.point.deviations[i],
+                last.fit.point.noises[i],
                 conclusions.selection.trials.steps_of_readings[i],
             )
         )
@@ -90,7 +90,7 @@ def diagnosis(conclusions: Conclusions, propose: bool) -> Diagnosis:
 
 
 def _nuisances(conclusions: Conclusions) -> tuple[Nuisance, ...]:
-    """Hums of the sensors, in standard deviations of their noise, and the readings' clock."""
+    """Hums of the sensors, the colour of their noise and the readings' clock."""
     trials, point = conclusions.selection.trials, conclusions.proposal.last.fit.point
     columns = [BY_QUANTITY[trials.model.rig.signals[c].name].name for c in trials.channels]
     sizes = [
@@ -102,7 +102,10 @@ def _nuisances(conclusions: Conclusions) -> tuple[Nuisance, ...]:
         for hum, size in zip(trials.hums, sizes, strict=True)
     ]
     clock = [Nuisance("clock", dict.fromkeys(columns, point.clock))] if point.clock else []
-    return (*hums, *clock)
+    kept = np.exp(-trials.span / trials.stride / trials.block / point.colour_memory)
+    alike = {columns[0]: float(kept * (point.colour / point.noises[0]) ** 2)}
+    colour = [Nuisance("coloured noise", alike)] if point.colour else []
+    return (*hums, *clock, *colour)
 
 
 def rival_models(conclusions: Conclusions) -> tuple[RivalModel, ...]:

@@ -159,7 +159,7 @@ class Conclusions:
                     rms(curve[there, i] - trial.readings[there, i, 0]) / SI_FACTORS[column.unit]
                     for curve in models
                 )
-                floor = last.fit.point.deviations[i] / SI_FACTORS[column.unit]
+                floor = last.fit.point.noises[i] / SI_FACTORS[column.unit]
                 own[column.name] = Gap(
                     first, second, third, floor, self.predictions.holds_out(last)
                 )

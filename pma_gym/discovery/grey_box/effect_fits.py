@@ -7,7 +7,7 @@ import numpy as np
 
 from pma_gym.discovery.grey_box.first_fit import LESS, weaker
 from pma_gym.discovery.grey_box.hypothesis import Hypothesis, Move, added_paths, precise_fit
-from pma_gym.discovery.grey_box.prepared_trials import CLOCK, PreparedTrials
+from pma_gym.discovery.grey_box.prepared_trials import PreparedTrials
 from pma_gym.discovery.grey_box.slots import presliding, quantity_of, slot, values_of
 from pma_gym.discovery.grey_box.thresholds import ODD
 from pma_gym.effects import CATALOGUE
@@ -38,7 +38,8 @@ def tried(trials: PreparedTrials, now: Hypothesis, move: Move, careful: bool = F
     """Fit with a move added; `careful` from further starts."""
     candidate = move.candidate
     if move.is_nuisance:
-        start, free = move.start or now.fit.point, [*now.fit.coordinates, CLOCK]
+        start = move.start or now.fit.point
+        free = [*now.fit.coordinates, *trials.logging(move.name)]
         made = precise_fit(trials, now.box, start, free, now.fit.tied, rough=not careful)
         return replace(made, moves=(*now.moves, move), rivals=now.rivals)
     if candidate is None:

@@ -25,7 +25,7 @@ class Move:
         candidate: the effect.
         probe: its most promising probe.
         amount: how many times the probe's size.
-        slots: of parameters by trial, or `clock`.
+        slots: of parameters by trial, or `clock`, or `colour` and its memory.
         start: where its fit begins, if not at what it is added to.
     """
 

@@ -3,6 +3,7 @@
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +15,7 @@ from pma_gym.discovery.grey_box.latent_law import line_over_position
 from pma_gym.discovery.grey_box.prepared_trials import CLOCK, PreparedTrials
 from pma_gym.discovery.grey_box.slots import gains_of_drive, quantity_of, slot, values_of
 from pma_gym.discovery.grey_box.thresholds import LEAST_TRIALS, LIKE, ODD, TRIED
-from pma_gym.estimation.innovations import TREND, TRIAL, log_likelihood
+from pma_gym.estimation.innovations import COLOUR, TREND, TRIAL, log_likelihood
 from pma_gym.estimation.likelihood_fit import OTHERS, STEP, Coordinate, with_tied, with_values
 from pma_gym.estimation.smoother import smoothed
 
@@ -22,6 +23,9 @@ Array = NDArray[np.float64]
 
 CLOCKS = (1e-4, 3e-4, 1e-3, 2e-3, 4e-3, 8e-3, 0.016, 0.03)
 """Shares by which a clock runs fast or slow where its fits begin."""
+
+COLOURS, FADES = (0.1, 0.3, 1.0), 5
+"""Noises, and number of memories, where the fits of coloured noise begin."""
 
 NOTHING = 1e-9
 """Square of a change, in noises, that is none: rounding."""
@@ -50,7 +54,7 @@ class Screening:
         hide (`_beside`, `_clocks`).
         """
         moves, bent = self._moves(now), self.trials.is_bent(now.fit.point)
-        clocks = self._clocks(now) if bent else []
+        logging = [*(self._clocks(now) if bent else []), *self._coloured(now)]
         if bent and not now.moves:
             # A model that lacks much is bent by its fit: its lack is looked for from the model as
             # it came too.
@@ -60,11 +64,11 @@ class Screening:
                 if move.candidate
             ]
             moves = [*moves[:TRIED], *fresh[:TRIED], *moves[TRIED:]]
-            return moves[: 2 * TRIED] + _beside(now, moves, 2 * TRIED) + clocks
+            return moves[: 2 * TRIED] + _beside(now, moves, 2 * TRIED) + logging
         price = 0.5 * (0.5 * np.log(now.readings) + np.log(len(moves)))
         if not bent:
-            return [move for move in moves[:TRIED] if move.promise > price]
-        return moves[:TRIED] + _beside(now, moves, TRIED) + clocks
+            return [move for move in moves[:TRIED] if move.promise > price] + logging
+        return moves[:TRIED] + _beside(now, moves, TRIED) + logging
 
     def _moves(self, now: Hypothesis) -> list[Move]:
         """All that may be added, by what it promises less its price, the most first."""
@@ -126,6 +130,30 @@ class Screening:
             if gain > now.price_of(1) + LIKE:
                 moves += [Move(CLOCK.name, gain, 1, slots=(CLOCK.name,), start=here[best])]
         return moves
+
+    def _coloured(self, now: Hypothesis) -> list[Move]:
+        """Coloured noise of the first signal, where some of it is likelier than none."""
+        point = now.fit.point
+        if point.colour:
+            return []
+        size, memory = self.trials.logging(COLOUR)
+        kinds = product(
+            [share * self.trials.noise[0] for share in COLOURS],
+            np.geomspace(memory.lower, memory.upper, FADES).tolist(),
+        )
+        bases = [point, replace(point, forces=tuple(LESS[-1] * force for force in point.forces))]
+        here = [
+            replace(base, colour=deviation, colour_memory=fades)
+            for deviation, fades in kinds
+            for base in bases
+        ]
+        rows = now.box.rows
+        likely, none = (log_likelihood(now.box.innovations(ps), rows) for ps in (here, bases))
+        best, slots = int(np.argmax(likely)), (size.name, memory.name)
+        gain = float(likely[best] - none.max())
+        if gain < now.price_of(len(slots)) + LIKE:
+            return []
+        return [Move(COLOUR, gain, len(slots), slots=slots, start=here[best])]
 
     def _effects(
         self, now: Hypothesis, error: Array, left: Array, beyond: Callable[[Array], Array]

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from math import hypot
 
 import numpy as np
 from numpy.typing import NDArray
@@ -83,10 +84,16 @@ class Predictions:
                 out[i] = curves[i]
         return out
 
+    @cached_property
+    def noise(self) -> list[float]:
+        """Noise of each read signal that misses are counted in, with that which has a colour."""
+        first, *others = self.trials.noise
+        return [hypot(first, self.path[-1].fit.point.colour), *others]
+
     def misfit(self, each: Hypothesis) -> float:
         """Root mean square of what predictions miss, in noises."""
         parts = [
-            ((curve - trial.readings[:, :, 0]) / self.trials.noise)[trial.measured]
+            ((curve - trial.readings[:, :, 0]) / self.noise)[trial.measured]
             for curve, trial in zip(self.curves(each), each.box.rows, strict=True)
         ]
         return rms(np.concatenate(parts))

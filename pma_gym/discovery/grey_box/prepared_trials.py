@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from pma_gym.discovery.grey_box.thresholds import FAINT, LOUD, STEP_MISS, STEP_SHARE
 from pma_gym.discovery.result.misfit import rms
 from pma_gym.effects.effect import signals
-from pma_gym.estimation.innovations import GreyBox, Point, Rows, is_rugged
+from pma_gym.estimation.innovations import COLOUR, GreyBox, Point, Rows, is_rugged
 from pma_gym.estimation.likelihood_fit import Coordinate
 from pma_gym.estimation.logged import Logged
 from pma_gym.plant.model import Model
@@ -42,7 +42,7 @@ still, every second, third ... block is read.
 BENT = 0.2
 """That bend at most, in standard deviations of a block's noise."""
 
-LEAST_FORCE = 1e-6
+LEAST_FORCE = 1e-9
 """Least latent force, as a share of the drive's."""
 
 MOST_DELAY = 20.0
@@ -236,6 +236,16 @@ class PreparedTrials:
         late = any(effect.port == "drive_delay" for effect in self.model.effects.values())
         delay = [] if late else [Coordinate("delay", self.span, False, 0.0, MOST_DELAY * self.span)]
         return [*noise, *forces, memory, *delay]
+
+    def logging(self, name: str) -> list[Coordinate]:
+        """Coordinates of what may be wrong with the logging: `clock` or `colour`."""
+        if name == CLOCK.name:
+            return [CLOCK]
+        least, most = self.memory
+        return [
+            Coordinate(COLOUR, 1.0, True, 1e-3 * self.noise[0], 1e3 * self.noise[0]),
+            Coordinate(f"{COLOUR}_memory", 1.0, True, 0.25 * least, most),
+        ]
 
     def is_bent(self, point: Point, share: float = FAINT) -> bool:
         """Whether a latent force, or more noise than the readings show, stands in for something."""

@@ -13,12 +13,12 @@ from pma_gym.discovery.grey_box.first_fit import hold_fits
 from pma_gym.discovery.grey_box.hypothesis import Hypothesis, Move
 from pma_gym.discovery.grey_box.kept_fits import fit
 from pma_gym.discovery.grey_box.predictions import Predictions
-from pma_gym.discovery.grey_box.prepared_trials import FINAL, LEAST_FORCE
+from pma_gym.discovery.grey_box.prepared_trials import CLOCK, FINAL, LEAST_FORCE
 from pma_gym.discovery.grey_box.slots import gains_of_drive, quantity_of, slot
 from pma_gym.discovery.grey_box.thresholds import FAR, LIKE, NOISES, SMALL
 from pma_gym.discovery.result.misfit import rms
 from pma_gym.discovery.thresholds import COMPLETE, SURE
-from pma_gym.estimation.likelihood_fit import OTHERS, value_of, with_tied, with_values
+from pma_gym.estimation.likelihood_fit import value_of, with_tied, with_values
 
 Array = NDArray[np.float64]
 
@@ -76,9 +76,7 @@ class Proposal:
     def is_worse(self) -> bool:
         """Whether the model as it came predicts better than the proposed one."""
         pairs = zip(self.predictions.given, self.last.box.rows, strict=True)
-        off = [
-            ((c - t.readings[:, :, 0]) / self.selection.trials.noise)[t.measured] for c, t in pairs
-        ]
+        off = [((c - t.readings[:, :, 0]) / self.predictions.noise)[t.measured] for c, t in pairs]
         return rms(np.concatenate(off)) < self.predictions.misfit(self.last)
 
     def share(self, each: Hypothesis) -> float:
@@ -185,8 +183,9 @@ class Proposal:
 def _is_sized(each: Hypothesis, move: Move) -> bool:
     """Whether some size of an added effect, or of a clock's error, is surely not none."""
     if move.candidate is None:
-        sizes = {n: abs(value_of(each.fit.point, n)) for n in move.slots if n in OTHERS}
-        return all(size > SURE * each.fit.deviations[n] for n, size in sizes.items())
+        # A deviation is never surely more than none: its price decides.
+        sizes = [(n, abs(value_of(each.fit.point, n))) for n in move.slots if n == CLOCK.name]
+        return all(size > SURE * each.fit.deviations[n] for n, size in sizes)
     made, candidate = each.fit, move.candidate
     for path, none, size in zip(
         candidate.paths, candidate.absent, candidate.amplitudes, strict=True

@@ -15,7 +15,7 @@ from pma_gym.discovery.grey_box.slots import quantity_of, slot, values_of
 from pma_gym.discovery.grey_box.thresholds import LIKE, LINE
 from pma_gym.effects import CATALOGUE
 from pma_gym.estimation.innovations import TREND, TRIAL, log_likelihood, value_in_trial
-from pma_gym.estimation.likelihood_fit import Coordinate, value_of, with_tied, with_values
+from pma_gym.estimation.likelihood_fit import OTHERS, Coordinate, value_of, with_tied, with_values
 
 WIDER = (1.0, 0.2, 5.0)
 """Times the usual shape (a Stribeck speed) from which the fuller law of an effect is fitted."""
@@ -139,7 +139,8 @@ def without(trials: PreparedTrials, base: Hypothesis, now: Hypothesis, gone: Mov
     def stays(name: str) -> bool:
         return not name.startswith(effect) and name not in gone.slots
 
-    point, made = now.fit.point, now.fit
+    made = now.fit
+    point = replace(made.point, **{name: 0.0 for name in gone.slots[:1] if name in OTHERS})
     numbers = {name: value for name, value in point.numbers.items() if stays(name)}
     tied = {name: of for name, of in made.tied.items() if stays(name) and stays(of)}
     numbers = {name: v for name, v in numbers.items() if name not in made.tied or name in tied}

@@ -41,6 +41,13 @@ def _logging(conclusions: Conclusions) -> list[str]:
         signal = trials.model.rig.signals[hum.channel]
         size = f"{figure(hum.amplitude / SI_FACTORS[signal.unit])} {signal.unit}"
         said.append(f"The sensor of {signal.name} hums at {figure(hum.hertz)} Hz with {size}.")
+    if made.point.colour:
+        signal = trials.model.rig.signals[trials.channels[0]]
+        size = f"{figure(made.point.colour / SI_FACTORS[signal.unit])} {signal.unit}"
+        lasts = figure(made.point.colour_memory, 2)
+        said.append(
+            f"The sensor of {signal.name} has coloured noise of {size}, which lasts {lasts} s."
+        )
     if CLOCK.name not in made.deviations:
         return said
     value, error = 100.0 * made.point.clock, 100.0 * CONFIDENCE * made.deviations[CLOCK.name]

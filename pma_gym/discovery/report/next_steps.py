@@ -15,13 +15,15 @@ def what_to_do(diagnosis: Diagnosis) -> list[str]:
         "unknown": _describe,
         "undecidable": _measure,
     }[diagnosis.verdict](diagnosis)
-    steps += [_fix(each) for each in diagnosis.nuisances if diagnosis.given.rig.is_free]
+    if diagnosis.given.rig.is_free:
+        steps += filter(None, map(_fix, diagnosis.nuisances))
     if diagnosis.next_experiment and diagnosis.verdict != "undecidable":
         steps.append(_run_next(diagnosis))
     return steps
 
 
 def _fix(nuisance: Nuisance) -> str:
+    """What to do about a nuisance; nothing where it harms none."""
     where = listed([f"`{column}`" for column in nuisance.signals])
     if nuisance.kind == "clock":
         (share,) = set(nuisance.signals.values())
@@ -29,6 +31,8 @@ def _fix(nuisance: Nuisance) -> str:
             f"Log the commands and {where} by one clock, or divide the times of {where} by "
             f"{1.0 + share:.7g}: a simulation of these logs drifts away from them."
         )
+    if nuisance.kind == "coloured noise":
+        return ""
     return (
         f"Shield the sensor of {where}, or filter {figure(nuisance.hertz or 0.0)} Hz: this answer "
         "is without the hum, your logs are not."

@@ -107,6 +107,33 @@ def test_the_hum_of_a_sensor_is_said_and_leaves_no_misfit():
     assert after and float(after[1]) < 1.2e3 * NOISE["slide"]
 
 
+def coloured(time, size, lasts, seed=3):
+    """Noise of an exponential correlation, from its own seed."""
+    kept = np.exp(-(time[1] - time[0]) / lasts)
+    new = np.random.default_rng((seed, len(time))).standard_normal(len(time))
+    new[1:] *= np.sqrt(1.0 - kept**2)
+    return size * lfilter([1.0], [1.0, -kept], new)
+
+
+def test_coloured_noise_is_said_with_its_size_and_memory_and_is_no_effect():
+    size, lasts = 6e-5, 0.04
+    diagnosis = diagnosed("slide", lambda t, q: q + coloured(t, size, lasts))
+    assert not diagnosis.effects, diagnosis.sentence
+    said = re.search(r"coloured noise of ([\d.]+) mm, which lasts ([\d.]+) s", diagnosis.sentence)
+    assert said, diagnosis.sentence
+    assert float(said[1]) == pytest.approx(1e3 * size, rel=0.2)
+    assert float(said[2]) == pytest.approx(lasts, rel=0.4)
+    (known,) = diagnosis.nuisances
+    assert known.kind == "coloured noise"
+    assert known.signals["contraction_mm"] == pytest.approx(0.7, abs=0.15)
+    mass = diagnosis.model.parameters["slide"].mass
+    assert mass == pytest.approx(rigs.RIGS["slide"][0], rel=3e-3)
+    # What is missed is all noise, of either kind.
+    gap = diagnosis.gap["contraction_mm"]
+    assert gap.floor == pytest.approx(1e3 * np.hypot(size, NOISE["slide"]), rel=0.2)
+    assert gap.after < 1.3 * gap.floor
+
+
 def test_readings_without_hum_have_no_line():
     """Nor have those whose noise has a colour: its spectrum is high in a band."""
     for colour in (0.0, 0.8):
