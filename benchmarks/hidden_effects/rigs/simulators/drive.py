@@ -2,6 +2,12 @@
 
 import math
 from dataclasses import dataclass, field
+from itertools import pairwise
+
+from scipy.optimize import brentq
+
+NEAR = 1e-9
+"""Share of an interval within which two kinks are one."""
 
 
 @dataclass(frozen=True)
@@ -22,6 +28,10 @@ class Transmission:
     backward: float = 1.0
     dead: float = 0.0
 
+    def longest(self, step: float) -> float:
+        """The longest step (s) of those up to a given one that a lag's decay is smooth in."""
+        return min(step, 0.2 * self.lag) if self.lag else step
+
 
 @dataclass
 class Drive:
@@ -33,10 +43,14 @@ class Drive:
     Attributes:
         transmission: of the drive.
         interval: between rows (s).
+        edges: times within it (s), 0 and its end among them, between which the force is smooth: a
+            late command bends, and the force's slope jumps where the command changes its sign or
+            leaves the dead band.
     """
 
     transmission: Transmission
     interval: float
+    edges: list[float] = field(default_factory=list)
     _late: list[float] = field(default_factory=list)
     _commands: list[float] = field(default_factory=list)
     _lagged: float = 0.0
@@ -57,6 +71,38 @@ class Drive:
         self._commands.append(command)
         rows = [len(self._commands) - 1 - self._whole - each for each in (2, 1, 0)]
         self._late = [self._commands[max(row, 0)] for row in rows]
+        self.edges = self._edges()
+
+    def _edges(self) -> list[float]:
+        span, dead = self.interval, self.transmission.dead
+        bends = [0.0, self._part * span, span]
+        crossings = [
+            brentq(lambda time, level=level: self._passed(time) - level, start, end)
+            for start, end in pairwise(bends)
+            for level in {0.0, dead, -dead}
+            if (self._passed(start) - level) * (self._passed(end) - level) < 0.0
+        ]
+        edges = [0.0]
+        for edge in sorted([*bends, *crossings]):
+            if edge - edges[-1] > NEAR * span:
+                edges.append(edge)
+        edges[-1] = span
+        return edges
+
+    def halves(self, start: float, end: float) -> tuple[float, float]:
+        """Mean force over a part of the interval with weights that fall from 1 to 0, and that rise.
+
+        Each is half of the mean for a force that does not change.
+        """
+        inner = [edge for edge in self.edges if start < edge < end]
+        falls = rises = 0.0
+        for a, b in pairwise([start, *inner, end]):
+            for time, weight in ((a, 1.0), (0.5 * (a + b), 4.0), (b, 1.0)):
+                part = weight * (b - a) / 6.0 * self.at(time) / (end - start)
+                share = (time - start) / (end - start)
+                falls += (1.0 - share) * part
+                rises += share * part
+        return falls, rises
 
     def at(self, time: float) -> float:
         """Force (N, N m) so many seconds after the row before the last."""

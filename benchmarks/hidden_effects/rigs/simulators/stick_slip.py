@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -101,8 +102,7 @@ def simulate(
         start: position and speed.
     """
     axis, interval = Axis(rig, effects), 1.0 / rig.rate
-    longest = STRIBECK_STEPS if axis.falling else LONGEST
-    steps = max(1, int(np.ceil(interval / longest - 1e-9)))
+    longest = transmission.longest(STRIBECK_STEPS if axis.falling else LONGEST)
     drive = Drive(transmission, interval)
     state, (q, v) = _Contact(axis, drive), start
     table = np.empty((rows, 4))
@@ -112,8 +112,11 @@ def simulate(
         if row:
             command = source(row, q)
             drive.push(command)
-            for i in range(steps):
-                q, v = state.advance(q, v, i * interval / steps, interval / steps)
+            for start_, end in pairwise(drive.edges):
+                steps = math.ceil((end - start_) / longest - 1e-9)
+                step = (end - start_) / steps
+                for i in range(steps):
+                    q, v = state.advance(q, v, start_ + i * step, step)
         table[row] = q, v, state.acceleration(q, v, interval if row else 0.0), command
     return Motion(np.arange(rows) * interval, *table.T)
 
@@ -153,11 +156,11 @@ class _Contact:
     def _slip(
         self, q: float, v: float, sign: float, time: float, step: float
     ) -> tuple[float, float, float]:
-        """A step while it slips, at most until it stops or the drive turns; what it took (s)."""
-        step = self._until_it_turns(time, step)
+        """A step while it slips, at most until it stops; what it took (s)."""
         end = self._step(q, v, sign, time, step)
-        friction = self.axis.static(end[0], self.drive.at(time + step)) > 0.0
-        if not friction or end[1] * sign >= 0.0:
+        # Where the drive's force is none, so may be the friction at that end of the step.
+        ends = (q, self.drive.at(time)), (end[0], self.drive.at(time + step))
+        if not any(self.axis.static(*each) > 0.0 for each in ends) or end[1] * sign >= 0.0:
             return *end, step
         low, high = 0.0, step
         for _ in range(HALVINGS):
@@ -183,23 +186,6 @@ class _Contact:
         a4 = go(q + h * v3, v4, u2, sign)
         q_end = q + h / 6.0 * (v + 2.0 * v2 + 2.0 * v3 + v4)
         return q_end, v + h / 6.0 * (a1 + 2.0 * a2 + 2.0 * a3 + a4)
-
-    def _until_it_turns(self, time: float, step: float) -> float:
-        """A step, or less of it where the drive's force changes its sign within it (s).
-
-        The slope of what goes with the amount of that force jumps there.
-        """
-        low, high = 0.0, step
-        first = self.drive.at(time)
-        if first * self.drive.at(time + step) >= 0.0:
-            return step
-        for _ in range(HALVINGS):
-            middle = 0.5 * (low + high)
-            if self.drive.at(time + middle) * first > 0.0:
-                low = middle
-            else:
-                high = middle
-        return high
 
     def _until_it_breaks(self, q: float, time: float, left: float) -> float:
         """How long it still sticks, at most what is left (s)."""

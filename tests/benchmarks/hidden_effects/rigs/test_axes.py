@@ -130,6 +130,28 @@ def test_friction_that_bends_where_the_drive_turns_is_exact_at_the_longest_step(
     assert np.abs(rough.q - fine.q).max() < 1e-9
 
 
+TRANSMISSIONS = {
+    "none": Transmission(),
+    "delay": Transmission(delay=0.58e-3),
+    "late lag": Transmission(delay=1.3e-3, lag=0.4e-3),
+    "dead band": Transmission(delay=0.58e-3, dead=3.0),
+    "gain by sign": Transmission(forward=1.1),
+}
+
+
+@pytest.mark.parametrize("transmission", TRANSMISSIONS.values(), ids=TRANSMISSIONS)
+def test_a_drive_s_force_is_followed_whatever_bends_within_a_step(transmission, monkeypatch):
+    damped = rig(SLIDE, damping=5.0, rate=1000.0)
+    rough = stick_slip.simulate(damped, (), transmission, rattled, 500)
+    monkeypatch.setattr(stick_slip, "LONGEST", 1e-5)
+    fine = stick_slip.simulate(damped, (), transmission, rattled, 500)
+    assert np.abs(fine.q).max() > 1e-3
+    assert np.abs(rough.q - fine.q).max() < 1e-9
+    pytest.importorskip("mujoco")
+    other = mujoco_axis.simulate(damped, (), transmission, rattled, 500)
+    assert np.abs(other.q - fine.q).max() < 5e-9
+
+
 def test_mujoco_s_dry_friction_is_nearer_at_a_tenth_of_the_step():
     pytest.importorskip("mujoco")
     damped = rig(SLIDE, damping=5.0, rate=1000.0)
