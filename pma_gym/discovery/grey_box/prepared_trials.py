@@ -111,13 +111,9 @@ class PreparedTrials:
             for trials in (self.raw, self.logged)
         )
         self.steps_of_readings = [reading_step(rows) for rows in raw]
-        self.noise = [
-            max(white_noise(rows), s / 12**0.5)
-            for rows, s in zip(readings, self.steps_of_readings, strict=True)
-        ]
-        self.coarse = [
-            white_noise(rows) < s for rows, s in zip(readings, self.steps_of_readings, strict=True)
-        ]
+        pairs = list(zip(readings, self.steps_of_readings, strict=True))
+        self.noise = [max(white_noise(rows, s), s / 12**0.5) for rows, s in pairs]
+        self.coarse = [n < s for n, (_, s) in zip(self.noise, pairs, strict=True)]
         self.block = self._block(readings)
         total = sum(len(each.time) for each in logged) / self.block
         self.stride = max(1, int(total / MOST_ROWS))
@@ -265,8 +261,15 @@ def reading_step(rows: Sequence[Array]) -> float:
     return step if whole.mean() > STEP_SHARE else 0.0
 
 
-def white_noise(rows: Sequence[Array]) -> float:
-    """Standard deviation of white noise by third differences (squared weights sum to 20)."""
-    third = np.concatenate([np.diff(row, 3) for row in rows if row[3:].size])
+def white_noise(rows: Sequence[Array], step: float) -> float:
+    """Standard deviation of white noise by third differences (squared weights sum to 20).
+
+    Readings are spread over the step that they are rounded to, for the median of whole steps tells
+    nothing; the spread's own variance is taken off again.
+    """
+    spread = np.random.default_rng(0)
+    even = [row + step * spread.random(len(row)) for row in rows]
+    third = np.concatenate([np.diff(row, 3) for row in even if row[3:].size])
     robust = 1.4826 * float(np.median(np.abs(third)))
-    return max(robust, 0.3 * float(np.std(third)), 1e-12) / 20**0.5
+    variance = max(robust, 0.3 * float(np.std(third))) ** 2 / 20.0 - step**2 / 12.0
+    return max(variance, 1e-25) ** 0.5
