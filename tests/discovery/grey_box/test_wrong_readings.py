@@ -126,8 +126,7 @@ def test_coloured_noise_is_said_with_its_size_and_memory_and_is_no_effect():
     (known,) = diagnosis.nuisances
     assert known.kind == "coloured noise"
     assert known.signals["contraction_mm"] == pytest.approx(0.7, abs=0.15)
-    mass = diagnosis.model.parameters["slide"].mass
-    assert mass == pytest.approx(rigs.RIGS["slide"][0], rel=3e-3)
+    assert holds(diagnosis.parameters["slide.mass_kg"].now, rigs.RIGS["slide"][0])
     # What is missed is all noise, of either kind.
     gap = diagnosis.gap["contraction_mm"]
     assert gap.floor == pytest.approx(1e3 * np.hypot(size, NOISE["slide"]), rel=0.2)
