@@ -6,7 +6,7 @@ step away, those of numbers of single trials together, in the lanes of one run; 
 eight damping factors (Levenberg and Marquardt), of which the best is taken.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -24,7 +24,7 @@ WIDE_STEPS = 3e-2, 3e-3
 """The same where a likelihood is rugged, one after the other, and `STEP` last.
 
 Where friction turns a row earlier or later the likelihood jumps, and a short step sees no slope but
-that of a jump.
+that of a jump. So the information is of steps of a standard error, at most the first of these.
 """
 
 RUNAWAY = 1e100
@@ -206,7 +206,7 @@ def fit(
         size = sizes[0]
         signs = np.where(within(x + size) > x, size, -size)
         _, results = valued([x, *(x + signs * together)])
-        information, scores = _scored(box, results, signs, of)
+        information, scores = _scored(box, results, signs, of, 0 * of)
         gradient = scores.sum(axis=0) - weight * (x - origin)
         information += np.diag(weight)
         # What is at an end of its range and drawn beyond it takes no part in the step.
@@ -221,7 +221,27 @@ def fit(
         sizes = sizes if gain > least else sizes[1:]
         if not sizes:
             break
+    if is_rugged(box.model) and not rough and np.isfinite(best):
+
+        def beside(errors: Array) -> tuple[Array, Array]:
+            ahead, behind = within(x + errors), within(x - errors)
+            ends = [x + (y - x) * row for y in (ahead, behind) for row in together]
+            last = np.where(of, of + len(together), 0)
+            passed = np.maximum(ahead - behind, STEP)
+            own, slopes = _scored(box, valued([x, *ends])[1], passed, of, last)
+            return own + np.diag(weight), slopes
+
+        information, scores = _at_standard_errors(beside, p)
     return Fit(point(x), best, tuple(coordinates), dict(tied), information, scores)
+
+
+def _at_standard_errors(
+    beside: Callable[[Array], tuple[Array, Array]], count: int
+) -> tuple[Array, Array]:
+    """Information and scores by what lies a standard error before and after each coordinate."""
+    errors, out = np.full(count, WIDE_STEPS[0]), beside(np.full(count, WIDE_STEPS[0]))
+    spread = np.diag(np.asarray(np.linalg.pinv(out[0]), float))
+    return beside(np.clip(np.sqrt(np.maximum(spread, 0.0)), STEP, errors))
 
 
 def _together(
@@ -262,21 +282,24 @@ def _damped(
 def _scored(
     box: GreyBox,
     results: Sequence[tuple[Array, Array]],
-    signs: Array,
+    passed: Array,
     of: NDArray[np.int64],
+    behind: NDArray[np.int64],
 ) -> tuple[Array, Array]:
     """Expected information (p, p) and scores (blocks, p) from runs at and beside a point.
 
-    `of` is the run of each coordinate by trial, shape (trials, p).
+    `of` and `behind` are the runs after and before each coordinate has `passed` so much, by trial,
+    shape (trials, p).
     """
     slopes, sizes = [], []
     with np.errstate(all="ignore"):
-        for (errors, spreads), trial, runs in zip(results, box.rows, of, strict=True):
+        every = zip(results, box.rows, of, behind, strict=True)
+        for (errors, spreads), trial, runs, before in every:
             mask = trial.there.ravel()
             e, s = (a.reshape(len(a), -1)[:, mask] for a in (errors, spreads))
             root = np.sqrt(s[0])
-            de = (e[runs] - e[0]) / (signs[:, None] * root)
-            ds = (np.log(s[runs]) - np.log(s[0])) / signs[:, None]
+            de = (e[runs] - e[before]) / (passed[:, None] * root)
+            ds = (np.log(s[runs]) - np.log(s[before])) / passed[:, None]
             bad = ~((np.abs(de) < RUNAWAY) & np.isfinite(ds))
             slopes.append(np.where(bad, 0.0, np.stack([de, ds])))
             white = e[0] / root

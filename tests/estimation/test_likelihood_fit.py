@@ -76,7 +76,7 @@ def test_scores_of_all_blocks_sum_to_the_gradient_of_the_log_likelihood(linear):
         return [with_values(away, {c.name: c.value(c.of(away) + step)}) for c in ALL]
 
     runs = np.arange(1, len(ALL) + 1)[None].repeat(len(linear.rows), axis=0)
-    scores = _scored(linear, value(away, *beside(1e-4)), np.full(len(ALL), 1e-4), runs)[1]
+    scores = _scored(linear, value(away, *beside(1e-4)), np.full(len(ALL), 1e-4), runs, 0 * runs)[1]
     up, down = (log_likelihood(value(*beside(step)), linear.rows) for step in (1e-4, -1e-4))
     gradient = (up - down) / 2e-4
     np.testing.assert_allclose(scores.sum(axis=0), gradient, rtol=3e-3, atol=0.1)
@@ -91,7 +91,7 @@ def test_a_filter_that_runs_away_beside_a_point_tells_no_slope(linear):
     errors[1, 40:] = 1e200
     runs = np.arange(1, len(ALL) + 1)[None]
     results, signs = [(errors, spreads)], np.full(len(ALL), 1e-4)
-    information, scores = _scored(linear, results, signs, runs)
+    information, scores = _scored(linear, results, signs, runs, 0 * runs)
     assert np.isfinite(information).all() and np.isfinite(scores).all()
     assert np.diag(information)[1:].min() > 0.0
 

@@ -160,11 +160,23 @@ class EffectSelection:
                 continue
             seen.add(key)
             self.tell(step, done, self.planned)
-            larger = tried(self.trials, now, move)
-            self.gains.setdefault(move.name, larger.fit.value - now.fit.value)
-            carried = _ends_within(larger) if move.candidate else is_carried(now, larger)
-            chains += [[*chain, larger]] if move.is_nuisance or carried else []
+            larger = self._tried(now, move)
+            chains += [[*chain, larger]] if larger else []
         return sorted(chains, key=self._worth, reverse=True)
+
+    def _tried(self, now: Hypothesis, move: Move) -> Hypothesis | None:
+        """With a move, or with a trend where one trial's value gains but carries too little."""
+        larger = tried(self.trials, now, move)
+        gain = larger.fit.value - now.fit.value
+        self.gains.setdefault(move.name, gain)
+        of_all = move.candidate or move.is_nuisance
+        if _ends_within(larger) if of_all else is_carried(now, larger):
+            return larger
+        base, is_trial, _ = move.name.partition(TRIAL)
+        if is_trial and gain > now.price_of(1) + LIKE:
+            slot = f"{base}{TREND}"
+            return self._tried(now, Move(slot, 0.0, 1, slots=(slot,)))
+        return None
 
     def _keep(self, chains: Sequence[Sequence[Hypothesis]]) -> None:
         """Keep what was fitted last by what was added, the likeliest of each."""
@@ -212,15 +224,19 @@ def _cost(now: Hypothesis, move: Move) -> int:
 
 
 def _ends_within(larger: Hypothesis) -> bool:
-    """Whether no number of the effect that was added last has gone as far as it may.
+    """Whether no number of what was added last has gone as far as it may.
 
-    A ripple whose period is as long as the way is none. Friction's shape may be at its end.
+    A ripple whose period is as long as the way is none, nor is noise that lasts, which is drift.
+    Friction's shape may be at its end.
     """
-    candidate = larger.moves[-1].candidate
-    assert candidate is not None
-    if CATALOGUE[candidate.effect].rate_independent_law:
+    move = larger.moves[-1]
+    if move.candidate and CATALOGUE[move.candidate.effect].rate_independent_law:
         return True
-    own = [c for c in larger.fit.coordinates if c.name.startswith(f"{candidate.effect}.")]
+    effect = move.candidate.effect if move.candidate else ""
+    added = (
+        c.name in move.slots or c.name.startswith(f"{effect}.") for c in larger.fit.coordinates
+    )
+    own = [c for c, is_own in zip(larger.fit.coordinates, added, strict=True) if is_own]
     values = [value_of(larger.fit.point, c.name) for c in own]
     return not any(value in (c.lower, c.upper) for value, c in zip(values, own, strict=True))
 

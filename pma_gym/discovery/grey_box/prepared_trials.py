@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pma_gym.discovery.grey_box.thresholds import FAINT, LOUD, STEP_MISS, STEP_SHARE
+from pma_gym.discovery.grey_box.thresholds import FAINT, HORIZON_S, LOUD, STEP_MISS, STEP_SHARE
 from pma_gym.discovery.result.misfit import rms
 from pma_gym.effects.effect import signals
 from pma_gym.estimation.innovations import COLOUR, GreyBox, Point, Rows, is_rugged
@@ -234,13 +234,16 @@ class PreparedTrials:
         return [*noise, *forces, memory, *delay]
 
     def logging(self, name: str) -> list[Coordinate]:
-        """Coordinates of what may be wrong with the logging: `clock` or `colour`."""
+        """Coordinates of what may be wrong with the logging: `clock` or `colour`.
+
+        Noise that lasts longer than a prediction is drift, which a latent force carries as well.
+        """
         if name == CLOCK.name:
             return [CLOCK]
-        least, most = self.memory
+        least, _ = self.memory
         return [
             Coordinate(COLOUR, 1.0, True, 1e-3 * self.noise[0], 1e3 * self.noise[0]),
-            Coordinate(f"{COLOUR}_memory", 1.0, True, 0.25 * least, most),
+            Coordinate(f"{COLOUR}_memory", 1.0, True, 0.25 * least, max(least, HORIZON_S)),
         ]
 
     def is_bent(self, point: Point, share: float = FAINT) -> bool:
