@@ -151,7 +151,7 @@ class EffectSelection:
             for move in screening.worth_a_fit(chain[-1])[: BESIDE if rank else None]
         ]
         costs = np.cumsum([0, *(_cost(chain[-1], move) for chain, move in plans)])
-        self.planned = int(AFTER * costs[-1])
+        self.planned, self.most = int(AFTER * costs[-1]), 0.0
         for (chain, move), done in zip(plans, costs.tolist(), strict=False):
             now = chain[-1]
             names = frozenset(each.name for each in (*now.moves, move))
@@ -165,16 +165,17 @@ class EffectSelection:
         return sorted(chains, key=self._worth, reverse=True)
 
     def _tried(self, now: Hypothesis, move: Move) -> Hypothesis | None:
-        """With a move, or with a trend where one trial's value gains but carries too little."""
+        """With a move; with a trend where one trial's value gains most but carries too little."""
         larger = tried(self.trials, now, move)
         gain = larger.fit.value - now.fit.value
         self.gains.setdefault(move.name, gain)
+        self.most = max(self.most, gain)
         of_all = move.candidate or move.is_nuisance
         if _ends_within(larger) if of_all else is_carried(now, larger):
             return larger
         base, is_trial, _ = move.name.partition(TRIAL)
-        if is_trial and gain > now.price_of(1) + LIKE:
-            slot = f"{base}{TREND}"
+        slot = f"{base}{TREND}"
+        if is_trial and gain == self.most > now.price_of(1) + LIKE:
             return self._tried(now, Move(slot, 0.0, 1, slots=(slot,)))
         return None
 

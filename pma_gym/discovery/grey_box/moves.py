@@ -9,13 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
+from pma_gym.discovery.grey_box.effect_fits import SLIPS
 from pma_gym.discovery.grey_box.first_fit import LESS, SHARES
 from pma_gym.discovery.grey_box.hypothesis import Hypothesis, Move, added_paths
 from pma_gym.discovery.grey_box.latent_law import line_over_position
 from pma_gym.discovery.grey_box.prepared_trials import CLOCK, PreparedTrials
 from pma_gym.discovery.grey_box.slots import gains_of_drive, quantity_of, slot, values_of
 from pma_gym.discovery.grey_box.thresholds import LEAST_TRIALS, LIKE, ODD, TRIED
-from pma_gym.estimation.innovations import COLOUR, TREND, TRIAL, log_likelihood
+from pma_gym.estimation.innovations import COLOUR, TREND, TRIAL, Point, log_likelihood
 from pma_gym.estimation.likelihood_fit import OTHERS, STEP, Coordinate, with_tied, with_values
 from pma_gym.estimation.smoother import smoothed
 
@@ -112,24 +113,42 @@ class Screening:
         """
         if any(c.name == CLOCK.name for c in now.fit.coordinates):
             return []
-        point, unmoved, moves = now.fit.point, self.unmoved.fit.point, []
-        bases = [replace(point, forces=tuple(LESS[-1] * force for force in point.forces))]
-        if not now.moves:
-            forces = (SHARES[0] * self.trials.force,) * len(point.forces)
-            noise, memory = tuple(self.trials.noise), self.trials.memory[0]
-            bases += [replace(unmoved, forces=forces, deviations=noise, memory=memory)]
-        for base in bases:
-            here = [
-                replace(base, clock=error, delay=late * point.delay)
-                for error in (0.0, *CLOCKS, *(-error for error in CLOCKS))
-                for late in (1.0, 0.0)
-            ]
-            likely = log_likelihood(now.box.innovations(here), now.box.rows)
-            best = int(np.argmax(likely))
-            gain = float(likely[best] - likely[:2].max())
+        point, moves = now.fit.point, []
+        kinds = [[replace(point, forces=tuple(LESS[-1] * force for force in point.forces))]]
+        kinds += [] if now.moves else [self._fresh(len(point.forces))]
+        for bases in kinds:
+            none, here = (
+                [
+                    replace(base, clock=error, delay=late * point.delay)
+                    for error in errors
+                    for base in bases
+                    for late in (1.0, 0.0)
+                ]
+                for errors in ((0.0,), (*CLOCKS, *(-error for error in CLOCKS)))
+            )
+            likely = log_likelihood(now.box.innovations([*none, *here]), now.box.rows)
+            best = int(np.argmax(likely[len(none) :]))
+            gain = float(likely[len(none) + best] - likely[: len(none)].max())
             if gain > now.price_of(1) + LIKE:
                 moves += [Move(CLOCK.name, gain, 1, slots=(CLOCK.name,), start=here[best])]
         return moves
+
+    def _fresh(self, count: int) -> list[Point]:
+        """The model as it came beside some latent force in so many trials.
+
+        With the noise that readings show, and dry friction of any presliding distance.
+        """
+        noise, memory = tuple(self.trials.noise), self.trials.memory[0]
+        point = replace(self.unmoved.fit.point, deviations=noise, memory=memory)
+        slips = {n: v for n, v in point.numbers.items() if n.endswith(".presliding")}
+        return [
+            with_values(
+                replace(point, forces=(share * self.trials.force,) * count),
+                {name: times * value for name, value in slips.items()},
+            )
+            for share in SHARES[:2]
+            for times in (SLIPS if slips else SLIPS[2:3])
+        ]
 
     def _coloured(self, now: Hypothesis) -> list[Move]:
         """Coloured noise of the first signal, where some of it is likelier than none."""
