@@ -13,7 +13,7 @@ from pma_gym import Plant
 from pma_gym.data.trial import Trial
 from pma_gym.discovery import diagnose
 from pma_gym.discovery.grey_box.hum import without_hum
-from pma_gym.discovery.grey_box.prepared_trials import PreparedTrials
+from pma_gym.discovery.grey_box.prepared_trials import PreparedTrials, white_noise
 from pma_gym.discovery.report.next_steps import what_to_do
 from pma_gym.estimation.logged import Logged
 from tests.discovery.grey_box import test_free_rigs as rigs
@@ -105,6 +105,16 @@ def test_the_hum_of_a_sensor_is_said_and_leaves_no_misfit():
     assert any("filter 37.3 Hz" in step for step in what_to_do(diagnosis))
     after = re.search(r"miss by ([\d.]+) mm", diagnosis.sentence)
     assert after and float(after[1]) < 1.2e3 * NOISE["slide"]
+
+
+@pytest.mark.parametrize("share", [0.02, 0.2, 0.42, 1.0])
+def test_the_noise_of_readings_is_told_however_coarse_their_step(share):
+    """Half a step of noise was two thirds of itself: the median of whole steps is a whole one."""
+    step, generator = 1e-4, np.random.default_rng(1)
+    drawn = 0.0317 * step * np.arange(20_000) + share * step * generator.standard_normal(20_000)
+    read = step * np.round(drawn / step)
+    told = np.hypot(share * step, step / 12**0.5)
+    assert max(white_noise([read], step), step / 12**0.5) == pytest.approx(told, rel=0.2)
 
 
 def coloured(time, size, lasts, seed=3):
