@@ -9,21 +9,11 @@ from pma_gym.discovery.grey_box.hypothesis import Hypothesis, precise_fit
 from pma_gym.discovery.grey_box.kept_fits import fit
 from pma_gym.discovery.grey_box.prepared_trials import PreparedTrials
 from pma_gym.discovery.grey_box.slots import own_coordinates
-from pma_gym.discovery.grey_box.thresholds import LEAST_TRIALS, ODD
 from pma_gym.estimation.innovations import GreyBox, Point, is_rugged, log_likelihood
 from pma_gym.estimation.likelihood_fit import Coordinate, value_of, with_tied, with_values
 
 STARTS, SMOOTH_STARTS = 5, 3
 """Of the first fit, with and without dry friction, whose likelihood is rugged."""
-
-MOST_TRIALS = 6
-"""With so many trials at most, each is once taken for an odd one.
-
-With a large latent force of its own at the start.
-"""
-
-ODD_SHARE = 0.005
-"""Latent force, as a share of the drive's, from which on that is done."""
 
 AGREEING, ALIKE = 3, 0.5
 """Starts that agree end the first fit, and the log likelihood within which they do."""
@@ -53,7 +43,7 @@ def first_fit(
     """The model as it came, fitted; `tell` is called with what is done of its total."""
     own, tied = own_coordinates(trials.box(trials.model))
     coordinates = [*own, *trials.nuisances()]
-    rough, number = is_rugged(trials.model), len(trials.logged)
+    rough = is_rugged(trials.model)
     count = STARTS if rough else SMOOTH_STARTS
     kinds: Sequence[bool] = (False, True)
     fits: dict[bool, list[Hypothesis]] = {linear: [] for linear in kinds}
@@ -61,16 +51,16 @@ def first_fit(
     def best(linear: bool) -> Hypothesis:
         return max(fits[linear], key=lambda each: each.fit.value)
 
-    def start(k: int, odd: int) -> None:
+    def start(k: int) -> None:
         for linear in kinds:
             # It may end after `AGREEING`: between that and all, until then.
             tell("refitting parameters", k, count + 2 if k > AGREEING else (count + AGREEING) // 2)
             box = trials.box(trials.model, linear)
-            begin = _begin(trials, seed, box, coordinates, tied, k, odd)
+            begin = _begin(trials, seed, box, coordinates, tied, k)
             fits[linear].append(precise_fit(trials, box, begin, coordinates, tied, linear=linear))
 
     for k in range(count):
-        start(k, -1)
+        start(k)
         kinds = (max(fits, key=lambda each: best(each).fit.value),) if k else kinds
         values = sorted(each.fit.value for each in fits[kinds[0]])
         if len(values) >= AGREEING and values[-1] - values[-AGREEING] < ALIKE:
@@ -81,14 +71,6 @@ def first_fit(
         for linear in fits:
             fits[linear] += hold_fits(trials, now, linear)
         trials.linear = max(fits, key=lambda each: best(each).fit.value)
-    forces = best(trials.linear).fit.point.forces
-    if (
-        LEAST_TRIALS <= number <= MOST_TRIALS
-        and max(forces) > ODD * min(forces)
-        and max(forces) > ODD_SHARE * trials.force
-    ):
-        for odd in range(number):
-            start(0, odd)
     return lighter(trials, best(trials.linear))
 
 
@@ -134,21 +116,14 @@ def _begin(
     coordinates: Sequence[Coordinate],
     tied: Mapping[str, str],
     k: int,
-    odd: int,
 ) -> Point:
-    """Start number k: the first is the model as it came, the last have one odd trial."""
+    """Start number k: the first is the model as it came."""
     generator = np.random.default_rng((seed, k))
     memory = float(np.sqrt(trials.memory[0] * trials.memory[1])) if k % 2 else trials.memory[0]
-    shares = [SHARES[k % 4] if odd < 0 or i != odd else 1.0 for i in range(len(trials.logged))]
-    point = Point(
-        box.numbers(), tuple(trials.noise), tuple(share * trials.force for share in shares), memory
-    )
+    forces = (SHARES[k % 4] * trials.force,) * len(trials.logged)
+    point = Point(box.numbers(), tuple(trials.noise), forces, memory)
     own = [c for c in coordinates if c.name in point.numbers]
-    factors = (
-        np.exp(SCATTER * generator.standard_normal(len(own)))
-        if k and odd < 0
-        else np.ones(len(own))
-    )
+    factors = np.exp(SCATTER * generator.standard_normal(len(own))) if k else np.ones(len(own))
     values = {
         c.name: float(np.clip(value_of(point, c.name) * f, c.lower, c.upper))
         for c, f in zip(own, factors, strict=True)
