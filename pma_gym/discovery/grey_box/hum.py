@@ -103,8 +103,12 @@ def _hum(trials: PreparedTrials, at: int) -> Hum | None:
     """The line that stands out most in the readings of one signal where the rig does not move.
 
     Beside those that are taken out. None where it is not worth its price: that of a wave in every
-    single trial, and of a frequency among those of the spectrum.
+    single trial, and of a frequency among those of the spectrum. Nor where most readings stand
+    still in one step, which a hum would leave.
     """
+    rows = trials.box(trials.model).rows
+    if 2 * sum(r.there[:, at].sum() for r in rows) < sum(r.measured[:, at].sum() for r in rows):
+        return None
     before = _followed(trials, at)
     hertz, power, _ = line_power(before.times, before.left)
     # A noise with a colour has no line: against what is left around it.
