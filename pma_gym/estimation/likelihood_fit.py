@@ -205,43 +205,48 @@ def fit(
     for _ in range(most if np.isfinite(best) else 0):
         size = sizes[0]
         signs = np.where(within(x + size) > x, size, -size)
-        _, results = valued([x, *(x + signs * together)])
-        information, scores = _scored(box, results, signs, of, 0 * of)
+        beside = valued([x, *(x + signs * together)])[1]
+        information, scores = _scored(box, beside, signs, of, 0 * of)
         gradient = scores.sum(axis=0) - weight * (x - origin)
         information += np.diag(weight)
         # What is at an end of its range and drawn beyond it takes no part in the step.
         out = (within(x + size * np.sign(gradient)) == x) & (gradient != 0.0)
         steps = [within(x + step) for step in _damped(information, gradient, out, damping)]
-        values, _ = valued(steps)
-        at = int(np.argmax(values))
+        at = int(np.argmax(values := valued(steps)[0]))
         gain = float(values[at]) - best
         if gain > 0.0:
             x, best = steps[at], float(values[at])
             damping = float(np.clip(damping * 10.0 ** (at - 2), 1e-6, 1e3))
-        sizes = sizes if gain > least else sizes[1:]
-        if not sizes:
+        if not (sizes := sizes if gain > least else sizes[1:]):
             break
     if is_rugged(box.model) and not rough and np.isfinite(best):
-
-        def beside(errors: Array) -> tuple[Array, Array]:
-            ahead, behind = within(x + errors), within(x - errors)
-            ends = [x + (y - x) * row for y in (ahead, behind) for row in together]
-            last = np.where(of, of + len(together), 0)
-            passed = np.maximum(ahead - behind, STEP)
-            own, slopes = _scored(box, valued([x, *ends])[1], passed, of, last)
-            return own + np.diag(weight), slopes
-
-        information, scores = _at_standard_errors(beside, p)
+        information, scores = _at_standard_errors(box, valued, within, x, (together, of), weight)
     return Fit(point(x), best, tuple(coordinates), dict(tied), information, scores)
 
 
 def _at_standard_errors(
-    beside: Callable[[Array], tuple[Array, Array]], count: int
+    box: GreyBox,
+    valued: Callable[[Sequence[Array]], tuple[Array, list[tuple[Array, Array]]]],
+    within: Callable[[Array], Array],
+    x: Array,
+    runs: tuple[NDArray[np.bool_], NDArray[np.int64]],
+    weight: Array,
 ) -> tuple[Array, Array]:
-    """Information and scores by what lies a standard error before and after each coordinate."""
-    errors, out = np.full(count, WIDE_STEPS[0]), beside(np.full(count, WIDE_STEPS[0]))
-    spread = np.diag(np.asarray(np.linalg.pinv(out[0]), float))
-    return beside(np.clip(np.sqrt(np.maximum(spread, 0.0)), STEP, errors))
+    """Information and scores by what lies a standard error before and after each coordinate.
+
+    The standard errors are those by `WIDE_STEPS`; `runs` are those of `_together`.
+    """
+    (together, of), errors = runs, np.full(len(x), WIDE_STEPS[0])
+    last, information, scores = np.where(of, of + len(together), 0), np.empty(0), np.empty(0)
+    for _ in range(2):
+        ahead, behind = within(x + errors), within(x - errors)
+        beside = [x + (end - x) * row for end in (ahead, behind) for row in together]
+        passed = np.maximum(ahead - behind, STEP)
+        information, scores = _scored(box, valued([x, *beside])[1], passed, of, last)
+        information += np.diag(weight)
+        spread = np.diag(np.asarray(np.linalg.pinv(information), float))
+        errors = np.clip(np.sqrt(np.maximum(spread, 0.0)), STEP, WIDE_STEPS[0])
+    return information, scores
 
 
 def _together(

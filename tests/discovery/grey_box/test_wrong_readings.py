@@ -113,8 +113,8 @@ def test_the_noise_of_readings_is_told_however_coarse_their_step(share):
     step, generator = 1e-4, np.random.default_rng(1)
     drawn = 0.0317 * step * np.arange(20_000) + share * step * generator.standard_normal(20_000)
     read = step * np.round(drawn / step)
-    told = np.hypot(share * step, step / 12**0.5)
-    assert max(white_noise([read], step), step / 12**0.5) == pytest.approx(told, rel=0.2)
+    expected = np.hypot(share * step, step / 12**0.5)
+    assert max(white_noise([read], step), step / 12**0.5) == pytest.approx(expected, rel=0.2)
 
 
 def coloured(time, size, lasts, seed=3):
