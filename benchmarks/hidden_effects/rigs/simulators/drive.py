@@ -3,6 +3,7 @@
 import math
 from dataclasses import dataclass, field
 from itertools import pairwise
+from typing import cast
 
 from scipy.optimize import brentq
 
@@ -77,7 +78,7 @@ class Drive:
         span, dead = self.interval, self.transmission.dead
         bends = [0.0, self._part * span, span]
         crossings = [
-            brentq(lambda time, level=level: self._passed(time) - level, start, end)
+            cast(float, brentq(lambda t, level=level: self._passed(t) - level, start, end))
             for start, end in pairwise(bends)
             for level in {0.0, dead, -dead}
             if (self._passed(start) - level) * (self._passed(end) - level) < 0.0
