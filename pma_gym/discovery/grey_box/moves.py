@@ -52,7 +52,7 @@ class Screening:
         """The moves that promise half their price.
 
         Where there is a latent force, the first ones whatever they promise, and those that it may
-        hide (`_beside`, `_clocks`).
+        hide (`_beside`, `_clocks`). Coloured noise wherever some of it is likelier (`_coloured`).
         """
         moves, bent = self._moves(now), self.trials.is_bent(now.fit.point)
         logging = [*(self._clocks(now) if bent else []), *self._coloured(now)]

@@ -46,7 +46,8 @@ def _logging(conclusions: Conclusions) -> list[str]:
         size = f"{figure(made.point.colour / SI_FACTORS[signal.unit])} {signal.unit}"
         lasts = figure(made.point.colour_memory, 2)
         said.append(
-            f"The sensor of {signal.name} has coloured noise of {size}, which lasts {lasts} s."
+            f"The sensor of {signal.name} has coloured noise of {size} with a correlation time of "
+            f"{lasts} s."
         )
     if CLOCK.name not in made.deviations:
         return said

@@ -129,7 +129,9 @@ def test_coloured_noise_is_said_with_its_size_and_memory_and_is_no_effect():
     size, lasts = 6e-5, 0.04
     diagnosis = diagnosed("slide", lambda t, q: q + coloured(t, size, lasts))
     assert not diagnosis.effects, diagnosis.sentence
-    said = re.search(r"coloured noise of ([\d.]+) mm, which lasts ([\d.]+) s", diagnosis.sentence)
+    said = re.search(
+        r"coloured noise of ([\d.]+) mm with a correlation time of ([\d.]+) s", diagnosis.sentence
+    )
     assert said, diagnosis.sentence
     assert float(said[1]) == pytest.approx(1e3 * size, rel=0.2)
     assert float(said[2]) == pytest.approx(lasts, rel=0.4)

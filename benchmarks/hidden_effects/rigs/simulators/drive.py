@@ -8,7 +8,7 @@ from typing import cast
 from scipy.optimize import brentq
 
 NEAR = 1e-9
-"""Share of an interval within which two kinks are one."""
+"""Share of an interval within which two bends are one."""
 
 
 @dataclass(frozen=True)
