@@ -80,9 +80,12 @@ from pma_gym.effects.regulator.regulator_second_order import REGULATOR_SECOND_OR
 from pma_gym.effects.regulator.valve import AIR_VALVES
 from pma_gym.effects.residual_law import (
     RESIDUAL_FORCE_OF_CONTRACTION,
+    RESIDUAL_FORCE_OF_POSITION,
     RESIDUAL_FORCE_OF_PRESSURE,
     RESIDUAL_FORCE_OF_VELOCITY,
     RESIDUAL_LOAD,
+    RESIDUAL_TORQUE_OF_ANGLE,
+    RESIDUAL_TORQUE_OF_SPEED,
 )
 from pma_gym.effects.rig_ports import SECOND_PORTS
 from pma_gym.effects.sensors.bent_sensor import BENT_SENSORS
@@ -129,8 +132,11 @@ CATALOGUE: dict[str, Effect] = {
         COULOMB_FRICTION,
         HAND_PUSH,
         RESIDUAL_FORCE_OF_CONTRACTION,
+        RESIDUAL_FORCE_OF_POSITION,
         RESIDUAL_FORCE_OF_VELOCITY,
         RESIDUAL_FORCE_OF_PRESSURE,
+        RESIDUAL_TORQUE_OF_ANGLE,
+        RESIDUAL_TORQUE_OF_SPEED,
         CABLE,
         DRIVE,
         TWO_WAY_DRIVE,

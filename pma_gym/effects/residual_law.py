@@ -1,38 +1,57 @@
-"""Residual laws of free shape: straight lines between nine values.
+"""Residual laws of free shape: straight lines between nine values, or twice as many.
 
 They are no physical phenomena. A diagnosis fits them where no effect of the catalogue explains the
-data: they give the missing force, or load, as a function of contraction, speed, pressure or load.
-A model with such a law can be simulated although the cause is unknown.
+data: they give the missing force, torque, or load as a function of position, speed, pressure or
+load. A model with such a law can be simulated although the cause is unknown.
 """
 
 from collections import namedtuple
 from collections.abc import Callable
 from typing import Annotated, Any
 
-from pma_gym.effects.arithmetic import clip
+from pma_gym.effects.arithmetic import clip, maximum
 from pma_gym.effects.effect import Effect
 from pma_gym.units import Quantity
 
 HEIGHTS = 9
 """Number of values of a law, equally spaced."""
 
-_HEIGHT = Quantity("N", -500, 500, "fitted, whatever it is", 0.0, usual=5.0)
+FREE_LAW = "free law"
+"""What such a law replaces: another one."""
+
+_FORCE = Quantity("N", -1e6, 1e6, "fitted, whatever it is", 0.0, usual=5.0)
+_TORQUE = Quantity("N m", -1e6, 1e6, "fitted, whatever it is", 0.0, usual=0.5)
 
 
-def _parameters(name: str, unit: str, least: float, most: float, usual: tuple[float, float]) -> Any:  # noqa: ANN401
-    """Make a NamedTuple of the first argument, the range of arguments and the values."""
+def _parameters(
+    name: str,
+    unit: str,
+    least: float,
+    most: float,
+    usual: tuple[float, float],
+    height: Quantity = _FORCE,
+    halves: bool = False,
+) -> Any:  # noqa: ANN401
+    """Make a NamedTuple of the first argument, the range of arguments and the values.
+
+    Of `halves`, with what a law over a place has more half way between two values: a detent.
+    """
     ends = {
         "first": Quantity(unit, least, most, "where the data begin", usual=usual[0]),
-        "reach": Quantity(unit, 1.0, most - least, "how far they go from there", usual=usual[1]),
+        "reach": Quantity(unit, 1e-6, most - least, "how far they go from there", usual=usual[1]),
     }
-    fields = ends | {f"h{k}": _HEIGHT for k in range(HEIGHTS)}
+    fields = ends | {f"h{k}": height for k in range(HEIGHTS)}
+    fields |= {f"m{k}": height for k in range(HEIGHTS - 1)} if halves else {}
     tuple_class = namedtuple(name, fields)
     tuple_class.__annotations__ = {stem: Annotated[float, each] for stem, each in fields.items()}
     return tuple_class
 
 
-ForceOfContraction = _parameters("ForceOfContraction", "mm", -50, 200, (-10, 70))
-ForceOfVelocity = _parameters("ForceOfVelocity", "mm/s", -2000, 2000, (-50, 100))
+ForceOfContraction = _parameters("ForceOfContraction", "mm", -1e6, 1e6, (-10, 70))
+ForceOfPosition = _parameters("ForceOfPosition", "mm", -1e6, 1e6, (-50, 100), halves=True)
+ForceOfVelocity = _parameters("ForceOfVelocity", "mm/s", -1e6, 1e6, (-50, 100))
+TorqueOfAngle = _parameters("TorqueOfAngle", "deg", -1e7, 1e7, (-90, 180), _TORQUE, True)
+TorqueOfSpeed = _parameters("TorqueOfSpeed", "deg/s", -1e6, 1e6, (-90, 180), _TORQUE)
 ForceOfPressure = _parameters("ForceOfPressure", "kPa", -100, 2000, (150, 425))
 LoadOfLoad = _parameters("LoadOfLoad", "N", -100, 5000, (0, 1000))
 
@@ -42,15 +61,19 @@ def between_heights(value, p):
 
     Args:
         value: argument of the law (SI).
-        p: first, reach: argument of the first value and range of the arguments; h0 ... h8: values.
+        p: first, reach: argument of the first value and range of the arguments; h0 ... h8: values;
+            m0 ... m7, if any: what is added half way between two of them.
     Returns:
         Value of the law, in the unit of h0 (SI).
     """
-    place = (value - p.first) * (8.0 / p.reach)
-    heights = (p.h0, p.h1, p.h2, p.h3, p.h4, p.h5, p.h6, p.h7, p.h8)
+    first, reach, *values = p
+    place = (value - first) * (8.0 / reach)
+    heights, halves = values[:HEIGHTS], values[HEIGHTS:]
     height = heights[0]
     for k in range(len(heights) - 1):
         height = height + clip(place - k, 0.0, 1.0) * (heights[k + 1] - heights[k])
+    for k, more in enumerate(halves):
+        height = height + maximum(0.0, 1.0 - abs(2.0 * (place - k) - 1.0)) * more
     return height
 
 
@@ -59,7 +82,7 @@ def force_of_contraction(contraction, p):
 
     Args:
         contraction: shortening x from the resting length (m).
-        p: ForceOfContraction.
+        p: ForceOfContraction or ForceOfPosition.
     Returns:
         Force (N).
     Source:
@@ -68,14 +91,28 @@ def force_of_contraction(contraction, p):
     return between_heights(contraction, p)
 
 
-def force_of_velocity(velocity, p):
-    """Missing force on the slide as a function of speed (N); positive shortens the muscle.
+def torque_of_angle(angle, p):
+    """Missing torque on the joint as a function of the angle (N m); positive as the angle grows.
 
     Args:
-        velocity: rate of contraction x' (m/s).
-        p: ForceOfVelocity.
+        angle: of the joint (rad).
+        p: TorqueOfAngle.
     Returns:
-        Force (N).
+        Torque (N m).
+    Source:
+        None: fitted.
+    """
+    return between_heights(angle, p)
+
+
+def force_of_velocity(velocity, p):
+    """Missing force, or torque, as a function of speed; positive shortens the muscle.
+
+    Args:
+        velocity: rate of contraction x' (m/s), or of the angle (rad/s).
+        p: ForceOfVelocity or TorqueOfSpeed.
+    Returns:
+        Force (N, N m).
     Source:
         None: fitted.
     """
@@ -121,7 +158,7 @@ def _effect(name: str, port: str, parameters: type, law: Callable) -> Effect:
         law,
         signature=_SIGNATURE,
         held=("first", "reach"),
-        replaces="free law",
+        replaces=FREE_LAW,
     )
 
 
@@ -130,6 +167,15 @@ RESIDUAL_FORCE_OF_CONTRACTION = _effect(
 )
 RESIDUAL_FORCE_OF_VELOCITY = _effect(
     "residual_force_of_velocity", "slide_force", ForceOfVelocity, force_of_velocity
+)
+RESIDUAL_FORCE_OF_POSITION = _effect(
+    "residual_force_of_position", "slide_force", ForceOfPosition, force_of_contraction
+)
+RESIDUAL_TORQUE_OF_ANGLE = _effect(
+    "residual_torque_of_angle", "joint_torque", TorqueOfAngle, torque_of_angle
+)
+RESIDUAL_TORQUE_OF_SPEED = _effect(
+    "residual_torque_of_speed", "joint_torque", TorqueOfSpeed, force_of_velocity
 )
 RESIDUAL_FORCE_OF_PRESSURE = _effect(
     "residual_force_of_pressure", "muscle_force", ForceOfPressure, force_of_pressure

@@ -63,9 +63,7 @@ def diagnosis(conclusions: Conclusions, propose: bool) -> Diagnosis:
         model=conclusions.model,
         given=conclusions.selection.trials.model,
         covariance=covariance_of(
-            (base if conclusions.verdict == "unknown" else last).fit,
-            conclusions.model,
-            conclusions.selection.trials.model,
+            conclusions.written.fit, conclusions.model, conclusions.selection.trials.model
         ),
         rivals=rival_models(conclusions),
         approximate=Approximate(

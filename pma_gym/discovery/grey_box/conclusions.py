@@ -12,7 +12,13 @@ from pma_gym.data.trial_columns import BY_QUANTITY
 from pma_gym.discovery.answer.trial_records import gaps
 from pma_gym.discovery.diagnosis import Verdict
 from pma_gym.discovery.grey_box.effect_selection import EffectSelection
-from pma_gym.discovery.grey_box.latent_law import latent_force, latent_law, latent_line
+from pma_gym.discovery.grey_box.hypothesis import Hypothesis
+from pma_gym.discovery.grey_box.latent_law import (
+    fitted_law,
+    latent_force,
+    latent_law,
+    latent_line,
+)
 from pma_gym.discovery.grey_box.predictions import Predictions
 from pma_gym.discovery.grey_box.proposal import Proposal
 from pma_gym.discovery.grey_box.sizes import estimate, named_effects
@@ -56,7 +62,7 @@ class Conclusions:
         effects = proposal.delayed or any(move.candidate for move in last.moves)
         material = proposal.share(last) > MATERIAL and proposal.is_latent
         incomplete = material or proposal.is_latent and self.predictions.misfit(last) > COMPLETE
-        if material and not last.moves:
+        if last.free or material and not last.moves:
             return "unknown"
         if last.moves and proposal.left > LEFT and incomplete:
             return "unknown"
@@ -100,13 +106,18 @@ class Conclusions:
                 out[path_of(coordinate.name)] = Moved(start, now, off and self.verdict != "agrees")
         return out
 
+    @property
+    def written(self) -> Hypothesis:
+        """Whose model is written: nothing is added to it where nothing carries enough."""
+        none = self.verdict == "unknown" and not self.proposal.last.free
+        return self.predictions.path[0] if none else self.proposal.last
+
     @cached_property
     def model(self) -> Model:
         """The amended model."""
         if self.verdict == "agrees" or self.proposal.is_worse or self.proposal.far:
             return self.selection.trials.model
-        last = self.predictions.path[0] if self.verdict == "unknown" else self.proposal.last
-        model = last.box.model
+        last, model = self.written, self.written.box.model
         if self.proposal.delayed and self.verdict == "effect":
             (late,) = [each for each in self.proposal.candidates if each.name == "drive_delay"]
             model = late.beside(model)
@@ -119,7 +130,10 @@ class Conclusions:
     @cached_property
     def law(self) -> ResidualLaw | None:
         """What the latent force goes with."""
-        base = self.predictions.path[0]
+        base, last = self.predictions.path[0], self.proposal.last
+        if last.free:
+            rig = self.selection.trials.model.rig
+            return fitted_law(last, 1.0 - last.latent / base.latent, rig)
         rows = max(1.0, 2.0 * base.fit.point.memory / self.selection.trials.span)
         return latent_law(self.smooth, self.selection.trials.model.rig, rows)
 

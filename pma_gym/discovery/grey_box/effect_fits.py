@@ -5,14 +5,23 @@ from dataclasses import replace
 
 import numpy as np
 
+from pma_gym.discovery.fitting.free_law import free_law
 from pma_gym.discovery.grey_box.first_fit import LESS, weaker
-from pma_gym.discovery.grey_box.hypothesis import Hypothesis, Move, added_paths, precise_fit
+from pma_gym.discovery.grey_box.hypothesis import (
+    FREE_LAWS,
+    Hypothesis,
+    Move,
+    added_paths,
+    precise_fit,
+)
 from pma_gym.discovery.grey_box.prepared_trials import PreparedTrials
 from pma_gym.discovery.grey_box.slots import presliding, quantity_of, slot, values_of
-from pma_gym.discovery.grey_box.thresholds import ODD
+from pma_gym.discovery.grey_box.thresholds import LIKE, ODD
 from pma_gym.effects import CATALOGUE
+from pma_gym.effects.residual_law import HEIGHTS
 from pma_gym.estimation.innovations import TREND, TRIAL, GreyBox, Point, log_likelihood
 from pma_gym.estimation.likelihood_fit import Coordinate, value_of, with_tied, with_values
+from pma_gym.estimation.smoother import smoothed
 
 PARTS, SLIPS = (0.3, 1.0, 3.0), (0.01, 0.1, 1.0, 10.0, 100.0)
 """Starts of a candidate: times the size that the screening promises, and times the usual presliding
@@ -26,6 +35,10 @@ AMOUNTS = (-0.5, -0.3, 0.0, 0.3, 0.6, 1.0, 1.5, 2.0, 3.0)
 
 PROMISED = (0.0, 0.5, 1.0, 2.0)
 """Times what the screening promises that a parameter differs by trial where its fits begin."""
+
+HIGHEST = 3.0
+"""Standard deviation of a free law's heights, in latent forces, so that none of it makes up for an
+offset of the drive. Assumption."""
 
 MOST_FACTOR = 5.0
 """Factor that a parameter of one trial may differ by.
@@ -117,6 +130,34 @@ def _starts(
     order = np.argsort(-likely)
     first = {kind: at for at, kind in reversed([(i, kinds[i]) for i in order])}
     return [points[i] for i in order if first[kinds[i]] == i]
+
+
+def free_laws(trials: PreparedTrials, base: Hypothesis) -> list[Hypothesis]:
+    """With a force of free shape over the position, and with one over the speed, alone."""
+    point, made = base.fit.point, list[Hypothesis]()
+    states = [smoothed(base.box, point, i) for i in range(len(base.box.rows))]
+    ways = [each.position for each in states], [each.speed for each in states]
+    for name, values in zip(FREE_LAWS[trials.model.plant], ways, strict=True):
+        unit = CATALOGUE[name].quantities["first"]
+        least, most = (unit.from_si(float(end(np.concatenate(values)))) for end in (np.min, np.max))
+        candidate = free_law(base.box.model, name, (least, most))
+        box = trials.box(candidate.model, steps=base.box.rows[0].steps)
+        whole = replace(point, numbers={**box.numbers(), **point.numbers})
+        own = [
+            Coordinate(slot(path), max(point.forces), False, prior=HIGHEST)
+            for path in candidate.paths
+        ]
+        free, halves = [*base.fit.coordinates, *own[:HEIGHTS]], own[HEIGHTS:]
+        starts = [weaker(trials, whole, less) for less in LESS]
+        fits = [precise_fit(trials, box, each, free, base.fit.tied, rough=True) for each in starts]
+        best = max(fits, key=lambda each: each.fit.value)
+        if halves:
+            start, free = best.fit.point, [*free, *halves]
+            finer = precise_fit(trials, best.box, start, free, base.fit.tied, rough=True)
+            if finer.fit.value > best.fit.value + base.price_of(len(halves)) + LIKE:
+                best = finer
+        made.append(replace(best, moves=(Move(name, 0.0, len(own), candidate),)))
+    return made
 
 
 def _varied(trials: PreparedTrials, now: Hypothesis, move: Move, careful: bool) -> Hypothesis:

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
-from pma_gym.discovery.grey_box.effect_fits import tried
+from pma_gym.discovery.grey_box.effect_fits import free_laws, tried
 from pma_gym.discovery.grey_box.first_fit import first_fit, unmoved
 from pma_gym.discovery.grey_box.hypothesis import Hypothesis, Move
 from pma_gym.discovery.grey_box.moves import Screening
@@ -128,7 +128,22 @@ class EffectSelection:
             beam = [best]
             if self.trials.is_bent(best[-1].fit.point, MATERIAL):
                 beam += [c for c in chains[1:BEAM] if self._lead(c, c[:-1]) > 0.0]
-        return self._pruned(best)
+        return self._unless_free(self._pruned(best))
+
+    def _unless_free(self, chain: list[Hypothesis]) -> list[Hypothesis]:
+        """A law of free shape in place of what was added, where it is ahead and leaves less.
+
+        Less than `LEFT` of the latent force (mean square). Some effects together imitate what no
+        catalogue has; what has their own shape is as likely as one of free shape, for less.
+        """
+        base, last = chain[0], chain[-1]
+        named = any(move.candidate for move in last.moves)
+        if not named and not self.trials.is_bent(last.fit.point, MATERIAL):
+            return chain
+        self.tell("laws of free shape", 0, 1)
+        free = max(free_laws(self.trials, base), key=lambda each: each.fit.value)
+        is_less = free.latent < LEFT * last.latent
+        return [base, free] if is_less and self._is_ahead(free, last) else chain
 
     def _pruned(self, chain: list[Hypothesis]) -> list[Hypothesis]:
         """A chain without what is no longer worth its price beside what was added later."""
@@ -256,8 +271,7 @@ def is_carried(now: Hypothesis, larger: Hypothesis) -> bool:
         return False
     if not last.lower * 1.01 < own < last.upper * 0.99:
         return False
-    before, after = (float(np.sum(np.square(h.fit.point.forces))) for h in (now, larger))
-    return after < LEFT * before
+    return larger.latent < LEFT * now.latent
 
 
 def _densities(each: Hypothesis) -> Array:

@@ -10,8 +10,15 @@ from pma_gym.discovery.grey_box.kept_fits import fit
 from pma_gym.discovery.grey_box.prepared_trials import CLOSE, ROUGH, PreparedTrials
 from pma_gym.discovery.grey_box.slots import slot
 from pma_gym.effects import CATALOGUE
+from pma_gym.effects.residual_law import FREE_LAW
 from pma_gym.estimation.innovations import GreyBox, Point
 from pma_gym.estimation.likelihood_fit import OTHERS, Coordinate, Fit
+
+FREE_LAWS = {
+    "slide": ("residual_force_of_position", "residual_force_of_velocity"),
+    "joint": ("residual_torque_of_angle", "residual_torque_of_speed"),
+}
+"""Laws of free shape over the position and over the speed, by rig."""
 
 
 @dataclass(frozen=True)
@@ -43,6 +50,11 @@ class Move:
         """Whether it is of the logging alone: no part of the rig."""
         return self.candidate is None and set(self.slots) <= set(OTHERS)
 
+    @property
+    def is_free(self) -> bool:
+        """Whether it is a law of free shape: no effect of the catalogue has its shape."""
+        return bool(self.candidate) and CATALOGUE[self.candidate.effect].replaces == FREE_LAW
+
 
 @dataclass(frozen=True)
 class Hypothesis:
@@ -61,6 +73,16 @@ class Hypothesis:
     moves: tuple[Move, ...] = ()
     rivals: tuple[tuple[str, ...], ...] = ()
     alike: tuple["Hypothesis", ...] = ()
+
+    @property
+    def free(self) -> CandidateEffect | None:
+        """The law of free shape among what was added."""
+        return next((move.candidate for move in self.moves if move.is_free), None)
+
+    @property
+    def latent(self) -> float:
+        """Mean square of the latent force over trials, times their number (N^2, N^2 m^2)."""
+        return float(np.sum(np.square(self.fit.point.forces)))
 
     @property
     def readings(self) -> int:

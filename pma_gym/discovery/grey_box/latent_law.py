@@ -7,9 +7,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pma_gym.data.trial_columns import BY_QUANTITY, Column
+from pma_gym.discovery.grey_box.hypothesis import FREE_LAWS, Hypothesis
 from pma_gym.discovery.report.figure_text import capitalised, percent, signal_name
 from pma_gym.discovery.result.misfit import LatentForce, ResidualLaw
 from pma_gym.discovery.thresholds import CONFIDENCE, LEFT, RIPPLE_PERIODS
+from pma_gym.effects import CATALOGUE
+from pma_gym.effects.residual_law import between_heights
 from pma_gym.estimation.innovations import PORTS, SPEEDS
 from pma_gym.estimation.smoother import Smoothed
 from pma_gym.plant.model import Model
@@ -76,12 +79,38 @@ def latent_law(trials: Sequence[Smoothed], rig: Rig, rows: float) -> ResidualLaw
     if best is None or best[0] < 1.0 - LEFT:
         return None
     explained, column, at, mean, wide = best
+    return _law(rig, column, at, mean, wide, explained)
+
+
+def fitted_law(made: Hypothesis, explained: float, rig: Rig) -> ResidualLaw:
+    """The law of free shape of a hypothesis, which explains so much of the latent force.
+
+    With the band of its shape: an offset of the drive makes up for a constant.
+    """
+    assert made.free is not None
+    effect, fitted = CATALOGUE[made.free.effect], made.fit
+    own = {i: c for i, c in enumerate(fitted.coordinates) if c.name.startswith(f"{effect.name}.")}
+    ends, law_of = made.free.model.parameters[effect.name], effect.law or between_heights
+    at = np.linspace(ends.first, ends.first + ends.reach, len(own))
+    # It is linear in its values.
+    stems = [c.name.partition(".")[2] for c in own.values()]
+    basis = np.array([[law_of(x, ends._replace(**{stem: 1.0})) for stem in stems] for x in at])
+    law = basis @ np.array([fitted.point.numbers[c.name] for c in own.values()])
+    scaled = basis * np.array([c.scale for c in own.values()])
+    shape = scaled - scaled.mean(axis=0)
+    spread = shape @ fitted.curvature[np.ix_(list(own), list(own))] @ shape.T
+    column = BY_QUANTITY[rig.signals[FREE_LAWS[rig.name].index(effect.name)].name]
+    wide = CONFIDENCE * np.sqrt(np.diag(spread))
+    return _law(rig, column, at / SI_FACTORS[column.unit], law, wide, explained)
+
+
+def _law(
+    rig: Rig, column: Column, at: Array, law: Array, wide: Array, explained: float
+) -> ResidualLaw:
     what, unit = FORCES[rig.name]
     share = percent(explained)
     words = f"goes with {signal_name(column.name)}: that explains {share} of its mean square"
-    return ResidualLaw(
-        f"{what} ({unit})", _label(column), at, mean, mean - wide, mean + wide, words
-    )
+    return ResidualLaw(f"{what} ({unit})", _label(column), at, law, law - wide, law + wide, words)
 
 
 def latent_force(model: Model, before: Smoothed, after: Smoothed | None) -> LatentForce:

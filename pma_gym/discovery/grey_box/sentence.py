@@ -1,6 +1,7 @@
 """The verdict of a free rig as a person would say it."""
 
 from pma_gym.discovery.grey_box.conclusions import Conclusions
+from pma_gym.discovery.grey_box.hypothesis import Hypothesis
 from pma_gym.discovery.grey_box.latent_law import FORCES, largest_share
 from pma_gym.discovery.grey_box.prepared_trials import CLOCK
 from pma_gym.discovery.grey_box.sizes import estimate
@@ -59,7 +60,7 @@ def _logging(conclusions: Conclusions) -> list[str]:
 
 def _verdict(conclusions: Conclusions) -> str:
     """What is missing or off, and what predictions miss by."""
-    own, left = listed(by_trial(conclusions)), _left(conclusions)
+    own, left = listed(by_trial(conclusions)), _left(conclusions, conclusions.proposal.last)
     if conclusions.verdict == "effect":
         rest = f"; {own}" if own else ""
         is_rough = conclusions.proposal.share(conclusions.proposal.last) > MATERIAL
@@ -68,6 +69,9 @@ def _verdict(conclusions: Conclusions) -> str:
         return f"{named} missing{rest}: {_misses(conclusions)}{approximate}."
     if conclusions.verdict == "unknown":
         words = f" It {conclusions.law.words}." if conclusions.law else ""
+        if conclusions.proposal.last.free:
+            words += f" With that law {_misses(conclusions)}."
+            left = _left(conclusions, conclusions.predictions.path[0])
         if conclusions.line:
             hertz, of = conclusions.line
             words += f" It oscillates at {figure(hertz)} Hz: {percent(of)} of its variance."
@@ -126,10 +130,10 @@ def _misses(conclusions: Conclusions) -> str:
     )
 
 
-def _left(conclusions: Conclusions) -> str:
-    """The latent force that is left."""
+def _left(conclusions: Conclusions, each: Hypothesis) -> str:
+    """The latent force that is left beside a hypothesis."""
     what, unit = FORCES[conclusions.selection.trials.model.plant]
-    share = conclusions.proposal.share(conclusions.proposal.last)
+    share = conclusions.proposal.share(each)
     size = figure(share * conclusions.selection.trials.force)
     return f"a latent {what.split()[0]} of {size} {unit}, {percent(share)} of the drive's"
 

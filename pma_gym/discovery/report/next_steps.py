@@ -100,6 +100,11 @@ def _describe(diagnosis: Diagnosis) -> list[str]:
     write = (
         "Write it as a user effect, one Python file, and diagnose again with `--effect FILE.py`."
     )
+    if set(diagnosis.model.effects) - set(diagnosis.given.effects):
+        steps.append(
+            "Use the amended model, `model.toml` beside this page, until you know what acts: it has "
+            "that law, value by value."
+        )
     return [*steps, drafted if diagnosis.draft else write]
 
 

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
 from pma_gym.discovery.fitting.fit_problem import FitProblem, Fitted
+from pma_gym.discovery.fitting.free_law import free_law
 from pma_gym.discovery.result.misfit import ResidualLaw
 from pma_gym.discovery.thresholds import BUMP_HEIGHTS, CONFIDENCE, PERIODIC_TURNS, UNDETERMINED
-from pma_gym.effects import CATALOGUE
 from pma_gym.plant import sensors
 from pma_gym.units import SI_FACTORS
 
@@ -62,7 +62,7 @@ def estimated_laws(problem: FitProblem, refitted: Fitted) -> list[EstimatedLaw]:
     ranges = _ranges(problem, refitted)
     laws = []
     for name in LAWS:
-        candidate = _candidate(problem, name, ranges[name])
+        candidate = free_law(problem.given, name, ranges[name])
         fit = problem.fit(refitted.model, (candidate,), {name: candidate.absent})
         if fit is not None:
             laws.append(EstimatedLaw(name, candidate, fit, before - fit.chi_square))
@@ -149,23 +149,3 @@ def _ranges(problem: FitProblem, refitted: Fitted) -> dict[str, tuple[float, flo
         middle, half = 0.5 * (low + high), max(0.5 * (high - low), 1.0)
         ranges[name] = (float(middle - half), float(middle + half))
     return ranges
-
-
-def _candidate(problem: FitProblem, name: str, ends: tuple[float, float]) -> CandidateEffect:
-    """A law that does nothing, between its ends."""
-    effect = CATALOGUE[name]
-    file_keys = list(effect.names_in_files())
-    heights = file_keys[2:]
-    table = dict(zip(file_keys, (ends[0], ends[1] - ends[0], *([0.0] * len(heights))), strict=True))
-    zero = np.zeros(len(heights))
-    return CandidateEffect(
-        name,
-        name,
-        problem.given.with_effects({name: table}),
-        tuple(f"{name}.{file_key}" for file_key in heights),
-        np.ones(len(heights), bool),
-        zero,
-        np.eye(len(heights)),
-        np.ones(len(heights), bool),
-        np.ones(len(heights), bool),
-    )

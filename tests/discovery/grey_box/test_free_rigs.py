@@ -436,18 +436,41 @@ def test_where_no_trial_within_the_commands_of_the_logs_decides_that_is_said():
 
 
 @pytest.mark.usefixtures("forget_user_effects")
-def test_a_torque_that_no_effect_has_is_drafted_as_a_user_effect_which_closes_the_gap(tmp_path):
+def test_a_torque_that_no_effect_has_is_written_as_a_law_and_drafted_as_a_user_effect(tmp_path):
     trials = logs("joint", 2.0, friction=(0.0, 0.0, 0.0), bump=0.2)
     first = diagnose(trials, known := model("joint", inertia=1.0))
     assert first.verdict == "unknown" and "goes with angle" in first.sentence, first.sentence
-    # The law is the bump, where the joint was.
+    # The law is the bump, where the joint was, and the model with it closes the gap.
     bump = 0.2 * np.exp(-50.0 * (np.radians(first.law.at) - 0.2) ** 2)
     assert first.law.law == pytest.approx(bump, abs=0.04) and not first.next_experiment
+    assert "residual_torque_of_angle" in first.model.effects and not first.warnings
+    (gap,) = first.gap.values()
+    assert gap.held_out and gap.after < 0.25 * gap.parameters
     (tmp_path / "proposed_effect.py").write_text(first.draft)
     load_effects(tmp_path / "proposed_effect.py")
     (effect,) = (again := diagnose(trials, known, propose=False)).effects
     assert effect.parameters["share_percent"].value == pytest.approx(100.0, abs=20.0)
-    assert again.gap["angle_deg"].after < 0.2 * first.gap["angle_deg"].after
+    assert again.gap["angle_deg"].after < 0.2 * gap.parameters
+
+
+@pytest.mark.parametrize(("plant", "at", "stiffness"), [("joint", 0.3, 2.0), ("slide", 0.03, 2e3)])
+def test_a_bumper_is_no_effect_that_imitates_it_but_a_law_that_is_written(plant, at, stiffness):
+    def pushed(force, position):
+        return force - stiffness * max(position - at, 0.0)
+
+    trials = logs(plant, 2.0, friction=(0.0, 0.0, 0.0), drive=pushed)
+    diagnosis = diagnose(trials, model(plant, inertia=1.0), propose=False)
+    assert diagnosis.verdict == "unknown" and not diagnosis.effects, diagnosis.sentence
+    law = diagnosis.law
+    bumper = -stiffness * np.maximum(law.at / {"joint": 180.0 / np.pi, "slide": 1e3}[plant] - at, 0)
+    # An offset of the drive makes up for a constant, a straight line rounds the corner.
+    free, most = law.law - law.law[:5].mean(), np.ptp(bumper)
+    assert free == pytest.approx(bumper, abs=0.2 * most)
+    assert law.law[:5] == pytest.approx(law.law[:5].mean(), abs=0.02 * most)
+    assert (law.high - law.low).max() < 0.1 * most
+    (gap,) = diagnosis.gap.values()
+    assert gap.held_out and gap.after < 0.1 * gap.parameters
+    assert any(name.startswith("residual_") for name in diagnosis.model.effects)
 
 
 @pytest.mark.parametrize(
