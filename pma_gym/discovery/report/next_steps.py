@@ -102,8 +102,8 @@ def _describe(diagnosis: Diagnosis) -> list[str]:
     )
     if set(diagnosis.model.effects) - set(diagnosis.given.effects):
         steps.append(
-            "Use the amended model, `model.toml` beside this page, until you know what acts: it has "
-            "that law, value by value."
+            "Use the amended model, `model.toml` beside this page, until you know what acts: it "
+            "has that law, value by value."
         )
     return [*steps, drafted if diagnosis.draft else write]
 
