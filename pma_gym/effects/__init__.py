@@ -79,6 +79,8 @@ from pma_gym.effects.regulator.regulator_rate_limit import REGULATOR_RATE_LIMIT
 from pma_gym.effects.regulator.regulator_second_order import REGULATOR_SECOND_ORDER
 from pma_gym.effects.regulator.valve import AIR_VALVES
 from pma_gym.effects.residual_law import (
+    RESIDUAL_DAMPING_OF_ANGLE,
+    RESIDUAL_DAMPING_OF_POSITION,
     RESIDUAL_FORCE_OF_CONTRACTION,
     RESIDUAL_FORCE_OF_POSITION,
     RESIDUAL_FORCE_OF_PRESSURE,
@@ -135,6 +137,8 @@ CATALOGUE: dict[str, Effect] = {
         RESIDUAL_FORCE_OF_POSITION,
         RESIDUAL_FORCE_OF_VELOCITY,
         RESIDUAL_FORCE_OF_PRESSURE,
+        RESIDUAL_DAMPING_OF_POSITION,
+        RESIDUAL_DAMPING_OF_ANGLE,
         RESIDUAL_TORQUE_OF_ANGLE,
         RESIDUAL_TORQUE_OF_SPEED,
         CABLE,

@@ -21,6 +21,8 @@ FREE_LAW = "free law"
 
 _FORCE = Quantity("N", -1e6, 1e6, "fitted, whatever it is", 0.0, usual=5.0)
 _TORQUE = Quantity("N m", -1e6, 1e6, "fitted, whatever it is", 0.0, usual=0.5)
+_DAMPING = Quantity("N s/mm", -1e6, 1e6, "fitted, whatever it is", 0.0, usual=0.02)
+_TURNING = Quantity("N m s", -1e6, 1e6, "fitted, whatever it is", 0.0, usual=0.01)
 
 
 def _parameters(
@@ -51,6 +53,8 @@ ForceOfContraction = _parameters("ForceOfContraction", "mm", -1e6, 1e6, (-10, 70
 ForceOfPosition = _parameters("ForceOfPosition", "mm", -1e6, 1e6, (-50, 100), halves=True)
 ForceOfVelocity = _parameters("ForceOfVelocity", "mm/s", -1e6, 1e6, (-50, 100))
 TorqueOfAngle = _parameters("TorqueOfAngle", "deg", -1e7, 1e7, (-90, 180), _TORQUE, True)
+DampingOfPosition = _parameters("DampingOfPosition", "mm", -1e6, 1e6, (-50, 100), _DAMPING, True)
+DampingOfAngle = _parameters("DampingOfAngle", "deg", -1e7, 1e7, (-90, 180), _TURNING, True)
 TorqueOfSpeed = _parameters("TorqueOfSpeed", "deg/s", -1e6, 1e6, (-90, 180), _TORQUE)
 ForceOfPressure = _parameters("ForceOfPressure", "kPa", -100, 2000, (150, 425))
 LoadOfLoad = _parameters("LoadOfLoad", "N", -100, 5000, (0, 1000))
@@ -119,6 +123,36 @@ def force_of_velocity(velocity, p):
     return between_heights(velocity, p)
 
 
+def damping_of_contraction(contraction, velocity, p):
+    """Missing force on the slide of a damping that depends on the contraction (N).
+
+    Args:
+        contraction: (m).
+        velocity: rate of contraction x' (m/s).
+        p: DampingOfPosition.
+    Returns:
+        Force (N).
+    Source:
+        None: fitted.
+    """
+    return -velocity * between_heights(contraction, p)
+
+
+def damping_of_angle(angle, spin, p):
+    """Missing torque on the joint of a damping that depends on the angle (N m).
+
+    Args:
+        angle: of the joint (rad).
+        spin: its rate (rad/s).
+        p: DampingOfAngle.
+    Returns:
+        Torque (N m).
+    Source:
+        None: fitted.
+    """
+    return -spin * between_heights(angle, p)
+
+
 def force_of_pressure(pressure, p):
     """Missing force on the slide as a function of pressure (N); positive shortens the muscle.
 
@@ -170,6 +204,12 @@ RESIDUAL_FORCE_OF_VELOCITY = _effect(
 )
 RESIDUAL_FORCE_OF_POSITION = _effect(
     "residual_force_of_position", "slide_force", ForceOfPosition, force_of_contraction
+)
+RESIDUAL_DAMPING_OF_POSITION = _effect(
+    "residual_damping_of_position", "slide_force", DampingOfPosition, damping_of_contraction
+)
+RESIDUAL_DAMPING_OF_ANGLE = _effect(
+    "residual_damping_of_angle", "joint_torque", DampingOfAngle, damping_of_angle
 )
 RESIDUAL_TORQUE_OF_ANGLE = _effect(
     "residual_torque_of_angle", "joint_torque", TorqueOfAngle, torque_of_angle

@@ -17,6 +17,7 @@ from pma_gym.discovery.grey_box.hypothesis import (
 from pma_gym.discovery.grey_box.prepared_trials import PreparedTrials
 from pma_gym.discovery.grey_box.slots import presliding, quantity_of, slot, values_of
 from pma_gym.discovery.grey_box.thresholds import LIKE, ODD
+from pma_gym.discovery.result.misfit import rms
 from pma_gym.effects import CATALOGUE
 from pma_gym.effects.residual_law import HEIGHTS
 from pma_gym.estimation.innovations import TREND, TRIAL, GreyBox, Point, log_likelihood
@@ -133,20 +134,21 @@ def _starts(
 
 
 def free_laws(trials: PreparedTrials, base: Hypothesis) -> list[Hypothesis]:
-    """With a force of free shape over the position, and with one over the speed, alone."""
+    """With each law of free shape (`FREE_LAWS`) alone."""
     point, made = base.fit.point, list[Hypothesis]()
     states = [smoothed(base.box, point, i) for i in range(len(base.box.rows))]
-    ways = [each.position for each in states], [each.speed for each in states]
+    places, speeds = ([getattr(e, name) for e in states] for name in ("position", "speed"))
+    ways = places, speeds, places
     for name, values in zip(FREE_LAWS[trials.model.plant], ways, strict=True):
         unit = CATALOGUE[name].quantities["first"]
         least, most = (unit.from_si(float(end(np.concatenate(values)))) for end in (np.min, np.max))
         candidate = free_law(base.box.model, name, (least, most))
         box = trials.box(candidate.model, steps=base.box.rows[0].steps)
         whole = replace(point, numbers={**box.numbers(), **point.numbers})
-        own = [
-            Coordinate(slot(path), max(point.forces), False, prior=HIGHEST)
-            for path in candidate.paths
-        ]
+        # A damping's force is as large at the speed's root mean square.
+        speed = rms(np.concatenate(speeds)) if "damping" in name else 1.0
+        size = max(point.forces) / speed
+        own = [Coordinate(slot(path), size, prior=HIGHEST) for path in candidate.paths]
         free, halves = [*base.fit.coordinates, *own[:HEIGHTS]], own[HEIGHTS:]
         starts = [weaker(trials, whole, less) for less in LESS]
         fits = [precise_fit(trials, box, each, free, base.fit.tied, rough=True) for each in starts]
@@ -156,7 +158,7 @@ def free_laws(trials: PreparedTrials, base: Hypothesis) -> list[Hypothesis]:
             finer = precise_fit(trials, best.box, start, free, base.fit.tied, rough=True)
             if finer.fit.value > best.fit.value + base.price_of(len(halves)) + LIKE:
                 best = finer
-        made.append(replace(best, moves=(Move(name, 0.0, len(own), candidate),)))
+        made.append(replace(best, moves=(*base.moves, Move(name, 0.0, len(own), candidate))))
     return made
 
 

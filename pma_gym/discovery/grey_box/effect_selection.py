@@ -141,7 +141,11 @@ class EffectSelection:
         if not named and not self.trials.is_bent(last.fit.point, MATERIAL):
             return chain
         self.tell("laws of free shape", 0, 1)
-        free = max(free_laws(self.trials, base), key=lambda each: each.fit.value)
+        # Beside the same noise and clock.
+        plain = last if any(move.is_nuisance for move in last.moves) else base
+        for move in last.moves if plain is last else ():
+            plain = plain if move.is_nuisance else without(self.trials, base, plain, move)
+        free = max(free_laws(self.trials, plain), key=lambda each: each.fit.value)
         is_less = free.latent < LEFT * last.latent
         return [base, free] if is_less and self._is_ahead(free, last) else chain
 

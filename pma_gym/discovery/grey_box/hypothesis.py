@@ -15,10 +15,15 @@ from pma_gym.estimation.innovations import GreyBox, Point
 from pma_gym.estimation.likelihood_fit import OTHERS, Coordinate, Fit
 
 FREE_LAWS = {
-    "slide": ("residual_force_of_position", "residual_force_of_velocity"),
-    "joint": ("residual_torque_of_angle", "residual_torque_of_speed"),
+    "slide": (
+        "residual_force_of_position",
+        "residual_force_of_velocity",
+        "residual_damping_of_position",
+    ),
+    "joint": ("residual_torque_of_angle", "residual_torque_of_speed", "residual_damping_of_angle"),
 }
-"""Laws of free shape over the position and over the speed, by rig."""
+"""Laws of free shape, by rig: forces over the position and over the speed, damping over the
+position."""
 
 
 @dataclass(frozen=True)

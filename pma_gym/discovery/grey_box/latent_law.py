@@ -79,7 +79,8 @@ def latent_law(trials: Sequence[Smoothed], rig: Rig, rows: float) -> ResidualLaw
     if best is None or best[0] < 1.0 - LEFT:
         return None
     explained, column, at, mean, wide = best
-    return _law(rig, column, at, mean, wide, explained)
+    what, unit = FORCES[rig.name]
+    return _law(f"{what} ({unit})", column, at, mean, wide, explained)
 
 
 def fitted_law(made: Hypothesis, explained: float, rig: Rig) -> ResidualLaw:
@@ -90,27 +91,31 @@ def fitted_law(made: Hypothesis, explained: float, rig: Rig) -> ResidualLaw:
     assert made.free is not None
     effect, fitted = CATALOGUE[made.free.effect], made.fit
     own = {i: c for i, c in enumerate(fitted.coordinates) if c.name.startswith(f"{effect.name}.")}
-    ends, law_of = made.free.model.parameters[effect.name], effect.law or between_heights
+    ends = made.free.model.parameters[effect.name]
     at = np.linspace(ends.first, ends.first + ends.reach, len(own))
     # It is linear in its values.
     stems = [c.name.partition(".")[2] for c in own.values()]
-    basis = np.array([[law_of(x, ends._replace(**{stem: 1.0})) for stem in stems] for x in at])
-    law = basis @ np.array([fitted.point.numbers[c.name] for c in own.values()])
-    scaled = basis * np.array([c.scale for c in own.values()])
+    basis = np.array([[between_heights(x, ends._replace(**{s: 1.0})) for s in stems] for x in at])
+    height = effect.quantities["h0"]
+    scaled = basis * np.array([height.from_si(c.scale) for c in own.values()])
+    law = scaled @ np.array([c.of(fitted.point) for c in own.values()])
     shape = scaled - scaled.mean(axis=0)
-    spread = shape @ fitted.curvature[np.ix_(list(own), list(own))] @ shape.T
-    column = BY_QUANTITY[rig.signals[FREE_LAWS[rig.name].index(effect.name)].name]
-    wide = CONFIDENCE * np.sqrt(np.diag(spread))
-    return _law(rig, column, at / SI_FACTORS[column.unit], law, wide, explained)
+    wide = CONFIDENCE * np.sqrt(
+        np.diag(shape @ fitted.curvature[np.ix_(list(own), list(own))] @ shape.T)
+    )
+    over_speed = FREE_LAWS[rig.name].index(effect.name) == 1
+    column = BY_QUANTITY[rig.signals[int(over_speed)].name]
+    what = f"damping of the {rig.name}" if "damping" in effect.name else FORCES[rig.name][0]
+    at = at / SI_FACTORS[column.unit]
+    return _law(f"{what} ({height.unit})", column, at, law, wide, explained)
 
 
 def _law(
-    rig: Rig, column: Column, at: Array, law: Array, wide: Array, explained: float
+    quantity: str, column: Column, at: Array, law: Array, wide: Array, explained: float
 ) -> ResidualLaw:
-    what, unit = FORCES[rig.name]
     share = percent(explained)
     words = f"goes with {signal_name(column.name)}: that explains {share} of its mean square"
-    return ResidualLaw(f"{what} ({unit})", _label(column), at, law, law - wide, law + wide, words)
+    return ResidualLaw(quantity, _label(column), at, law, law - wide, law + wide, words)
 
 
 def latent_force(model: Model, before: Smoothed, after: Smoothed | None) -> LatentForce:
@@ -202,8 +207,10 @@ def drafted_effect(law: ResidualLaw, rig: Rig) -> str:
     of = {_label(column): (column, state) for column, state in zip(columns, states, strict=True)}
     column, signal = of[law.variable]
     title = f"{capitalised(law.quantity)} over {law.variable}"
+    damps, unit = law.quantity.startswith("damping"), law.quantity.partition(" (")[2][:-1]
+    arguments, times = (f"{signal}, {states[1]}", f"-{states[1]} * ") if damps else (signal, "")
     at = tuple(float(f"{x * SI_FACTORS[column.unit]:.6g}") for x in law.at)
-    values = tuple(float(f"{y:.6g}") for y in law.law)
+    values = tuple(float(f"{y * SI_FACTORS[unit]:.6g}") for y in law.law)
     return f'''"""{title}, drafted from the smoothed latent force."""
 
 from typing import Annotated, NamedTuple
@@ -213,15 +220,15 @@ from pma_gym.effects.arithmetic import interp
 from pma_gym.units import Quantity
 
 AT = {at}
-FORCE = {values}
+LAW = {values}
 
 
 class Drafted(NamedTuple):
     share: Annotated[float, Quantity("%", 0, 1000, "100: as drafted", neutral=0.0, usual=100.0)]
 
 
-def drafted({signal}, p):
-    return p.share * interp({signal}, AT, FORCE)
+def drafted({arguments}, p):
+    return {times}p.share * interp({signal}, AT, LAW)
 
 
 DRAFTED = Effect("drafted", "{PORTS[rig.name]}", Drafted, drafted, signature="{law.words}")

@@ -30,6 +30,7 @@ def latent_picture(diagnosis: Diagnosis) -> bytes:
     forces.sort(key=lambda each: -rms(each[2].before))
     latent, timed = [force for *_, force in forces], forces[:_MOST_OVER_TIME]
     names, quantity = list(latent[0].over), latent[0].quantity
+    law = diagnosis.law if drawn_in(diagnosis) else None
     rows = [[i, i] for i in range(len(timed))] + [names[:2], [names[2], "rms"]]
     heights = [1.4] * len(timed) + [2.9, 2.9]
     with picture(9.6, 0.5 + sum(heights)) as drawn:
@@ -42,8 +43,8 @@ def latent_picture(diagnosis: Diagnosis) -> bytes:
             over = np.concatenate([force.over[name] for force in latent])
             _draw(panels[name], over, _joined(latent), ".", 0.5)
             panels[name].set_xlabel(name)
-            if diagnosis.law and diagnosis.law.variable == name:
-                _law(panels[name], diagnosis.law)
+            if law and law.variable == name:
+                _law(panels[name], law)
         ends = [each for force in latent for each in (force.before, force.after)]
         values = np.concatenate([each for each in ends if each is not None])
         room = 0.05 * float(np.ptp(values))
@@ -56,10 +57,16 @@ def latent_picture(diagnosis: Diagnosis) -> bytes:
         handles: list[Any] = [Patch(color=BEFORE, label="before: parameters refitted")]
         if latent[0].after is not None:
             handles.append(Patch(color=AFTER, label=f"after: {after_name(diagnosis)}"))
-        if diagnosis.law:
+        if law:
             handles.append(Line2D([], [], label="law of what is missing", **LAW))
         legend_below(drawn, handles, 3)
         return png(drawn)
+
+
+def drawn_in(diagnosis: Diagnosis) -> bool:
+    """Whether the law of what is missing is a force, and drawn in beside the latent force."""
+    forces = [each.latent.quantity for each in diagnosis.trials if each.latent]
+    return bool(diagnosis.law) and diagnosis.law.quantity in forces
 
 
 def _joined(forces: list[LatentForce]) -> LatentForce:

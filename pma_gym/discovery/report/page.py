@@ -15,7 +15,7 @@ from pma_gym.discovery.report.effect_text import (
     readable,
 )
 from pma_gym.discovery.report.figure_text import capitalised, chance, duration, odds
-from pma_gym.discovery.report.latent_picture import latent_picture
+from pma_gym.discovery.report.latent_picture import drawn_in, latent_picture
 from pma_gym.discovery.report.next_steps import what_to_do
 from pma_gym.discovery.report.pictures import (
     after_name,
@@ -102,7 +102,7 @@ def report_pictures(diagnosis: Diagnosis) -> dict[str, bytes]:
         pictures["maps"] = map_picture(diagnosis.maps[:_MOST_MAPS])
     if any(each.latent for each in diagnosis.trials):
         pictures["latent"] = latent_picture(diagnosis)
-    elif diagnosis.law:
+    if diagnosis.law and not drawn_in(diagnosis):
         pictures["law"] = law_picture(diagnosis.law)
     if diagnosis.next_experiment:
         pictures["next"] = commands_picture(diagnosis.next_experiment.trial)
@@ -184,19 +184,22 @@ def _parameter_blocks(diagnosis: Diagnosis) -> list[Block]:
 def _law_blocks(diagnosis: Diagnosis) -> list[Block]:
     law = diagnosis.law
     forces = [each.latent for each in diagnosis.trials if each.latent]
+    blocks = list[Block]()
     if forces:
-        drawn_in = f" Blue, with its 95 % band, its law: it {law.words}." if law else ""
+        inside = drawn_in(diagnosis)
+        said = f" Blue, with its 95 % band, its law: it {law.words}." if law and inside else ""
         proposed = f"; green: {after_name(diagnosis)}" if forces[0].after is not None else ""
         caption = (
             "Smoothed latent force, which stands for all that the model lacks. Grey: parameters "
-            f"refitted, nothing added{proposed}. On top, the trials with most of it.{drawn_in}"
+            f"refitted, nothing added{proposed}. On top, the trials with most of it.{said}"
         )
         heading = Heading(f"The latent force{' before and after' if proposed else ''}")
-        return [heading, Picture("latent", caption)]
-    if law is None:
-        return []
+        blocks = [heading, Picture("latent", caption)]
+    if law is None or drawn_in(diagnosis):
+        return blocks
     caption = f"What the model lacks, found by a flexible law: {law.quantity}. Band: 95 %."
-    return [Heading("The law of what is missing"), Paragraph(law.words), Picture("law", caption)]
+    heading = Heading("The law of what is missing")
+    return [*blocks, heading, Paragraph(law.words), Picture("law", caption)]
 
 
 def _confusion_blocks(diagnosis: Diagnosis) -> list[Block]:

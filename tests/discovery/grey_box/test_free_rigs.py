@@ -50,12 +50,13 @@ def logs(
     seed=1,
     bump=0.0,
     drive=lambda force, position: force,
+    brake=lambda position: 0.0,
 ):
     """Three trials of a rig that a controller moves along sums of sines, from a time on.
 
     Friction and gain of each trial are in shares of the rig's own. Friction is an impulse that at
     most stops the rig. A bump of force lies about 0.2 m or rad. `drive` is what a drive makes of a
-    command at a position.
+    command at a position, `brake` what damps more there.
     """
     inertia, damping, dry, (stiffness, rate_gain), size, noise, command, reading = RIGS[plant]
     generator, trials, step = np.random.default_rng(seed), [], 1.0 / RATE_HZ / SUBSTEPS
@@ -70,7 +71,6 @@ def logs(
         errors = (noise * generator.standard_normal(rows)).tolist()
         most, kick = friction[k] * dry * step / inertia, step / inertia
         # Of order 2: damping takes the mean speed of a step, forces act in the middle of its way.
-        lost = 0.5 * kick * damping
         position = speed = before = wish = 0.0
         read, forces = [], []
         for now, error in zip(asked.tolist(), errors, strict=True):
@@ -82,6 +82,7 @@ def logs(
             for _ in range(SUBSTEPS):
                 former, middle = speed, position + 0.5 * step * speed
                 hill = bump * exp(-50.0 * (middle - 0.2) ** 2)
+                lost = 0.5 * kick * (damping + brake(middle))
                 push = kick * (gain[k] * drive(force, middle) + hill)
                 speed = (speed * (1.0 - lost) + push) / (1.0 + lost)
                 speed -= min(max(speed, -most), most)
@@ -471,6 +472,21 @@ def test_a_bumper_is_no_effect_that_imitates_it_but_a_law_that_is_written(plant,
     (gap,) = diagnosis.gap.values()
     assert gap.held_out and gap.after < 0.1 * gap.parameters
     assert any(name.startswith("residual_") for name in diagnosis.model.effects)
+
+
+def test_a_brake_on_a_part_of_the_way_is_a_damping_over_the_position_that_is_drafted():
+    def brake(position):
+        return 0.2 * np.exp(-20.0 * (position - 0.2) ** 2)
+
+    trials = logs("joint", 2.0, friction=(0.0, 0.0, 0.0), brake=brake)
+    first = diagnose(trials, model("joint", inertia=1.0), propose=False)
+    assert first.verdict == "unknown" and first.law.quantity == "damping of the joint (N m s)"
+    # What it damps everywhere is the model's own damping.
+    truth, (gap,) = brake(np.radians(first.law.at)), first.gap.values()
+    assert first.law.law - first.law.law.min() == pytest.approx(truth, abs=0.05)
+    assert gap.held_out and gap.after < 0.5 * gap.parameters
+    assert "residual_damping_of_angle" in first.model.effects
+    assert "-spin * p.share * interp(angle, AT, LAW)" in first.draft
 
 
 @pytest.mark.parametrize(
