@@ -25,6 +25,9 @@ Array = NDArray[np.float64]
 FORCES = {"slide": ("force on the slide", "N"), "joint": ("torque on the joint", "N m")}
 """What a latent force is, and its unit, by rig."""
 
+DAMPING = "damping"
+"""Kind of a law of free shape that is none of forces."""
+
 BINS, LEAST_BINS = (12, 36), 3
 """Of a law that is drawn from the smoothed force, and the fewest that make one."""
 
@@ -105,7 +108,7 @@ def fitted_law(made: Hypothesis, explained: float, rig: Rig) -> ResidualLaw:
     )
     over_speed = FREE_LAWS[rig.name].index(effect.name) == 1
     column = BY_QUANTITY[rig.signals[int(over_speed)].name]
-    what = f"damping of the {rig.name}" if "damping" in effect.name else FORCES[rig.name][0]
+    what = f"{DAMPING} of the {rig.name}" if DAMPING in effect.name else FORCES[rig.name][0]
     at = at / SI_FACTORS[column.unit]
     return _law(f"{what} ({height.unit})", column, at, law, wide, explained)
 
@@ -114,7 +117,8 @@ def _law(
     quantity: str, column: Column, at: Array, law: Array, wide: Array, explained: float
 ) -> ResidualLaw:
     share = percent(explained)
-    words = f"goes with {signal_name(column.name)}: that explains {share} of its mean square"
+    goes = f"{'is a damping that ' if quantity.startswith(DAMPING) else ''}goes with"
+    words = f"{goes} {signal_name(column.name)}: that explains {share} of its mean square"
     return ResidualLaw(quantity, _label(column), at, law, law - wide, law + wide, words)
 
 
@@ -207,7 +211,7 @@ def drafted_effect(law: ResidualLaw, rig: Rig) -> str:
     of = {_label(column): (column, state) for column, state in zip(columns, states, strict=True)}
     column, signal = of[law.variable]
     title = f"{capitalised(law.quantity)} over {law.variable}"
-    damps, unit = law.quantity.startswith("damping"), law.quantity.partition(" (")[2][:-1]
+    damps, unit = law.quantity.startswith(DAMPING), law.quantity.partition(" (")[2][:-1]
     arguments, times = (f"{signal}, {states[1]}", f"-{states[1]} * ") if damps else (signal, "")
     at = tuple(float(f"{x * SI_FACTORS[column.unit]:.6g}") for x in law.at)
     values = tuple(float(f"{y * SI_FACTORS[unit]:.6g}") for y in law.law)

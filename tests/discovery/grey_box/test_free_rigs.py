@@ -481,6 +481,7 @@ def test_a_brake_on_a_part_of_the_way_is_a_damping_over_the_position_that_is_dra
     trials = logs("joint", 2.0, friction=(0.0, 0.0, 0.0), brake=brake)
     first = diagnose(trials, model("joint", inertia=1.0), propose=False)
     assert first.verdict == "unknown" and first.law.quantity == "damping of the joint (N m s)"
+    assert "It is a damping that goes with angle" in first.sentence
     # What it damps everywhere is the model's own damping.
     truth, (gap,) = brake(np.radians(first.law.at)), first.gap.values()
     assert first.law.law - first.law.law.min() == pytest.approx(truth, abs=0.05)
