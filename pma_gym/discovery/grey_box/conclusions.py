@@ -16,7 +16,6 @@ from pma_gym.discovery.grey_box.hypothesis import Hypothesis
 from pma_gym.discovery.grey_box.latent_law import (
     fitted_law,
     latent_force,
-    latent_law,
     latent_line,
 )
 from pma_gym.discovery.grey_box.predictions import Predictions
@@ -130,12 +129,10 @@ class Conclusions:
     @cached_property
     def law(self) -> ResidualLaw | None:
         """What the latent force goes with."""
-        base, last = self.predictions.path[0], self.proposal.last
-        if last.free:
-            rig = self.selection.trials.model.rig
-            return fitted_law(last, 1.0 - last.latent / base.latent, rig)
-        rows = max(1.0, 2.0 * base.fit.point.memory / self.selection.trials.span)
-        return latent_law(self.smooth, self.selection.trials.model.rig, rows)
+        base, free = self.predictions.path[0], self.selection.free
+        if free is None or free.latent > LEFT * base.latent:
+            return None
+        return fitted_law(free, 1.0 - free.latent / base.latent, self.selection.trials.model.rig)
 
     @cached_property
     def line(self) -> tuple[float, float] | None:

@@ -74,6 +74,7 @@ class EffectSelection:
         self.candidates = [each for each in candidates if each.name not in (*late, *SIMULATED)]
         self.gains: dict[str, float] = {}
         self.fitted: dict[frozenset[str], Hypothesis] = {}
+        self.free: Hypothesis | None = None
 
     def run(self) -> list[Hypothesis]:
         """From the model as it came to the last hypothesis that is worth its price.
@@ -146,6 +147,7 @@ class EffectSelection:
         for move in last.moves if plain is last else ():
             plain = plain if move.is_nuisance else without(self.trials, base, plain, move)
         free = max(free_laws(self.trials, plain), key=lambda each: each.fit.value)
+        self.free = free if self._is_ahead(free, plain) else None
         is_less = free.latent < LEFT * last.latent
         return [base, free] if is_less and self._is_ahead(free, last) else chain
 

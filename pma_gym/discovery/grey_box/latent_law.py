@@ -1,7 +1,6 @@
 """What the smoothed latent force goes with, in which trial it acts most, and a draft of its law."""
 
 from collections.abc import Sequence
-from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,62 +27,9 @@ FORCES = {"slide": ("force on the slide", "N"), "joint": ("torque on the joint",
 DAMPING = "damping"
 """Kind of a law of free shape that is none of forces."""
 
-BINS, LEAST_BINS = (12, 36), 3
-"""Of a law that is drawn from the smoothed force, and the fewest that make one."""
-
-PARTS = 6
-"""Of a single trial, each of which is left out once."""
-
 PERIODS, FINER, CUBIC = 3.0, 4, 3
 """Of a line in the shortest trial at least; points of its spectrum within its width; and the
 degree of what goes with the position smoothly, which the linear and cubic springs have."""
-
-
-def latent_law(trials: Sequence[Smoothed], rig: Rig, rows: float) -> ResidualLaw | None:
-    """The law, in bins of the position or the speed, whichever explains more of the force.
-
-    Args:
-        trials: smoothed forces (N, N m).
-        rig: a slide or a joint.
-        rows: that count as one independent value: two memories of the force.
-    Returns:
-        Means with 95 % bands; None where neither explains most of the mean square.
-    """
-    force = np.concatenate([each.force for each in trials])
-    columns = [BY_QUANTITY[signal.name] for signal in rig.signals[:2]]
-    values = [[each.position for each in trials], [each.speed for each in trials]]
-    sizes = [len(each.force) for each in trials]
-    part = np.repeat(np.arange(len(sizes)), sizes)
-    if len(sizes) == 1:
-        part = np.arange(sizes[0]) * PARTS // sizes[0]
-    best = None
-    for (column, parts), most in product(zip(columns, values, strict=True), BINS):
-        x = np.concatenate(parts)
-        edges = np.unique(np.quantile(x, np.linspace(0.0, 1.0, most + 1)))
-        bins = len(edges) - 1
-        if bins < LEAST_BINS:
-            continue
-        of = np.clip(np.searchsorted(edges, x, side="right") - 1, 0, bins - 1)
-        count = np.maximum(np.bincount(of, minlength=bins), 1)
-        mean = np.bincount(of, force, bins) / count
-        off = (force - mean[of]) ** 2
-        # By the other trials alone, or the other parts of one: no force that goes with time does.
-        counts, sums = (
-            np.bincount(part * bins + of, weights, (part[-1] + 1) * bins).reshape(-1, bins)
-            for weights in (np.ones(len(x)), force)
-        )
-        others = (sums.sum(axis=0) - sums) / np.maximum(counts.sum(axis=0) - counts, 1.0)
-        unseen = force - others[part, of]
-        explained = 1.0 - float(np.mean(unseen**2)) / max(float(np.mean(force**2)), 1e-300)
-        spread = np.sqrt(np.bincount(of, off, bins) / count / np.maximum(count / rows, 1.0))
-        at = 0.5 * (edges[:-1] + edges[1:]) / SI_FACTORS[column.unit]
-        if best is None or explained > best[0]:
-            best = explained, column, at, mean, CONFIDENCE * spread
-    if best is None or best[0] < 1.0 - LEFT:
-        return None
-    explained, column, at, mean, wide = best
-    what, unit = FORCES[rig.name]
-    return _law(f"{what} ({unit})", column, at, mean, wide, explained)
 
 
 def fitted_law(made: Hypothesis, explained: float, rig: Rig) -> ResidualLaw:
@@ -106,20 +52,19 @@ def fitted_law(made: Hypothesis, explained: float, rig: Rig) -> ResidualLaw:
     wide = CONFIDENCE * np.sqrt(
         np.diag(shape @ fitted.curvature[np.ix_(list(own), list(own))] @ shape.T)
     )
-    over_speed = FREE_LAWS[rig.name].index(effect.name) == 1
+    over_speed, damps = FREE_LAWS[rig.name].index(effect.name) == 1, DAMPING in effect.name
     column = BY_QUANTITY[rig.signals[int(over_speed)].name]
-    what = f"{DAMPING} of the {rig.name}" if DAMPING in effect.name else FORCES[rig.name][0]
-    at = at / SI_FACTORS[column.unit]
-    return _law(f"{what} ({height.unit})", column, at, law, wide, explained)
-
-
-def _law(
-    quantity: str, column: Column, at: Array, law: Array, wide: Array, explained: float
-) -> ResidualLaw:
-    share = percent(explained)
-    goes = f"{'is a damping that ' if quantity.startswith(DAMPING) else ''}goes with"
-    words = f"{goes} {signal_name(column.name)}: that explains {share} of its mean square"
-    return ResidualLaw(quantity, _label(column), at, law, law - wide, law + wide, words)
+    what = f"{DAMPING} of the {rig.name}" if damps else FORCES[rig.name][0]
+    goes = f"{'is a damping that ' if damps else ''}goes with {signal_name(column.name)}"
+    return ResidualLaw(
+        f"{what} ({height.unit})",
+        _label(column),
+        at / SI_FACTORS[column.unit],
+        law,
+        law - wide,
+        law + wide,
+        f"{goes}: that explains {percent(explained)} of its mean square",
+    )
 
 
 def latent_force(model: Model, before: Smoothed, after: Smoothed | None) -> LatentForce:
@@ -215,7 +160,7 @@ def drafted_effect(law: ResidualLaw, rig: Rig) -> str:
     arguments, times = (f"{signal}, {states[1]}", f"-{states[1]} * ") if damps else (signal, "")
     at = tuple(float(f"{x * SI_FACTORS[column.unit]:.6g}") for x in law.at)
     values = tuple(float(f"{y * SI_FACTORS[unit]:.6g}") for y in law.law)
-    return f'''"""{title}, drafted from the smoothed latent force."""
+    return f'''"""{title}, as a diagnosis fitted it."""
 
 from typing import Annotated, NamedTuple
 
