@@ -1,6 +1,7 @@
 """Predictions of trials, of those left out by fits that have not seen them, and what they miss."""
 
 from collections.abc import Callable, Sequence
+from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
 from math import hypot
@@ -13,13 +14,13 @@ from pma_gym.discovery.grey_box.kept_fits import fit
 from pma_gym.discovery.grey_box.prepared_trials import PreparedTrials
 from pma_gym.discovery.grey_box.thresholds import HORIZON, HORIZON_S
 from pma_gym.discovery.result.misfit import rms
-from pma_gym.estimation.innovations import TRIAL, GreyBox, counted, predictions
+from pma_gym.estimation.innovations import TRIAL, GreyBox, predictions
 from pma_gym.estimation.likelihood_fit import value_of, with_tied, with_values
 
 Array = NDArray[np.float64]
 
 FOLDS = 3
-"""Parts of the trials that are left out in turn."""
+"""Parts of the trials, or stretches of a single one, that are left out in turn."""
 
 
 @dataclass(frozen=True)
@@ -43,7 +44,7 @@ class Predictions:
         return min(HORIZON_S, HORIZON * shortest)
 
     def curves(self, each: Hypothesis) -> list[Array]:
-        """Predictions of all trials, those left out by fits that had not seen them."""
+        """Predictions of all trials, of what is left out by fits that had not seen it."""
         if id(each) not in self._curves:
             self._curves[id(each)] = (
                 self._left_out(each)
@@ -57,32 +58,36 @@ class Predictions:
         return {}
 
     def holds_out(self, each: Hypothesis) -> bool:
-        """Whether trials can be left out.
+        """Whether trials, or stretches of a single one, can be left out.
 
         A parameter of one trial alone cannot be estimated from the others.
         """
-        return len(self.trials.logged) > 1 and not any(TRIAL in move.name for move in each.moves)
+        return not any(TRIAL in move.name for move in each.moves)
 
     def _left_out(self, each: Hypothesis) -> list[Array]:
-        count = len(self.trials.logged)
-        out: list[Array] = [np.empty(0)] * count
-        for fold in range(min(FOLDS, count)):
+        parts, alone = self._parts(each.box), len(self.trials.logged) == 1
+        out = [np.full(trial.readings.shape[:2], np.nan) for trial in each.box.rows]
+        for fold in range(min(FOLDS, 1 + max(int(part.max()) for part in parts))):
             done, total = FOLDS * len(self._curves) + fold, FOLDS * (len(self.path) + 1)
             self.tell("trials left out", done, total)
-            left = [i for i in range(count) if i % FOLDS == fold]
-            rows = [
-                counted(trial, np.full(len(trial.time), i not in left))
-                for i, trial in enumerate(each.box.rows)
-            ]
-            for i in left:
-                rows[i].there = np.zeros_like(rows[i].there)
+            rows = [copy(trial) for trial in each.box.rows]
+            for trial, part in zip(rows, parts, strict=True):
+                trial.there = trial.there & (part != fold)[:, None]
             box = GreyBox(each.box.model, rows, each.box.channels, each.box.threads)
             made = fit(box, each.fit.point, each.fit.coordinates, each.fit.tied, near=True)
+            left = [i for i, part in enumerate(parts) if not alone and part[0] == fold]
             forces = {f"force {i}": value_of(each.fit.point, f"force {i}") for i in left}
             curves = predictions(each.box, with_values(made.point, forces), self.horizon)
-            for i in left:
-                out[i] = curves[i]
+            for i, (curve, part) in enumerate(zip(curves, parts, strict=True)):
+                out[i] = np.where((part == fold)[:, None], curve, out[i])
         return out
+
+    def _parts(self, box: GreyBox) -> list[NDArray[np.int64]]:
+        """In which part each row is left out, by trial: its trial's, or its stretch of one."""
+        if len(box.rows) == 1:
+            rows = len(box.rows[0].time)
+            return [np.arange(rows) * FOLDS // rows]
+        return [np.full(len(trial.time), i % FOLDS) for i, trial in enumerate(box.rows)]
 
     @cached_property
     def noise(self) -> list[float]:

@@ -121,7 +121,8 @@ def _far(conclusions: Conclusions) -> str:
 def _misses(conclusions: Conclusions) -> str:
     """What predictions miss by."""
     (signal, gap), *_ = conclusions.gap.items()
-    seen = " of trials that it was not fitted to" if gap.held_out else ""
+    parts = "trials" if len(conclusions.named) > 1 else "stretches"
+    seen = f" of {parts} that it was not fitted to" if gap.held_out else ""
     ahead = f"{figure(conclusions.predictions.horizon, 2)} s ahead{seen}"
     return (
         f"predictions of {signal_name(signal)} {ahead} miss by "

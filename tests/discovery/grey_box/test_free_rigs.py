@@ -486,6 +486,17 @@ def test_a_brake_on_a_part_of_the_way_is_a_damping_over_the_position_that_is_dra
     assert "-spin * p.share * interp(angle, AT, LAW)" in first.draft
 
 
+def test_of_one_long_log_stretches_are_left_out():
+    def bumped(force, position):
+        return force - 2.0 * max(position - 0.3, 0.0)
+
+    trials = logs("joint", 6.0, friction=(0.0, 0.0, 0.0), drive=bumped)[:1]
+    diagnosis = diagnose(trials, model("joint"), propose=False)
+    (gap,) = diagnosis.gap.values()
+    assert gap.held_out and "stretches that it was not fitted to" in diagnosis.sentence
+    assert gap.after < 0.1 * gap.parameters
+
+
 @pytest.mark.parametrize(
     ("force", "hertz"),
     [
