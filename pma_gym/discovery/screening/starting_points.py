@@ -69,7 +69,7 @@ def starting_points(
     """Where to begin fits of a candidate: values that explain most as they are, the best first.
 
     A look takes what a probe changes times a factor; here each is simulated, for a dead zone twice
-    as wide does not change twice as much.
+    as wide does not change twice as much. Where no probe explains anything there are none.
     """
     candidate, tried = score.candidate, []
     for probe, factor in score.starts:
@@ -77,5 +77,7 @@ def starting_points(
             values = candidate.grown(probe, float(each))
             if not any(np.array_equal(values, other) for other in tried):
                 tried.append(values)
+    if not tried:
+        return []
     gains = _simulated_gains(baseline, whitened, replace(candidate, probes=np.array(tried)))
     return [tried[k] for k in np.argsort(-gains, kind="stable")]

@@ -3,6 +3,8 @@
 import pytest
 
 from pma_gym.discovery.screening.candidates import candidate_effects
+from pma_gym.discovery.screening.score_test import ScreeningScore
+from pma_gym.discovery.screening.starting_points import starting_points
 from pma_gym.discovery.workflow import diagnose
 from pma_gym.effects import CATALOGUE
 from pma_gym.effects.ports import measured_output
@@ -45,6 +47,11 @@ def test_every_effect_that_can_be_absent_is_a_candidate_or_replaces_another_law(
             assert name not in effects
         elif effect.law and effect.neutral is not None and name not in STATION.parameters:
             assert name in effects, name
+
+
+def test_fits_of_a_candidate_of_which_no_probe_explains_anything_begin_nowhere():
+    idle = ScreeningScore(BY_NAME["hysteresis"], 0.0, 1.0, -1, 0.0, 0.0, None, ())
+    assert starting_points(None, None, idle) == []
 
 
 def test_a_warm_up_needs_repeats_in_order():
