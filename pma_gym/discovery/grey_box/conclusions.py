@@ -61,7 +61,8 @@ class Conclusions:
         effects = proposal.delayed or any(move.candidate for move in last.moves)
         material = proposal.share(last) > MATERIAL and proposal.is_latent
         incomplete = material or proposal.is_latent and self.predictions.misfit(last) > COMPLETE
-        if last.free or material and not last.moves:
+        # A law of free shape that trials left out do not confirm has refuted the others as well.
+        if self.predictions.path[-1].free or material and not last.moves:
             return "unknown"
         if last.moves and proposal.left > LEFT and incomplete:
             return "unknown"
