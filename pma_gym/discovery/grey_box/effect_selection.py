@@ -134,9 +134,8 @@ class EffectSelection:
     def _unless_free(self, chain: list[Hypothesis]) -> list[Hypothesis]:
         """A law of free shape in place of what was added, where it is ahead and leaves less.
 
-        Less than half of the latent force. Some effects together imitate what no catalogue has;
-        what has their own shape is as likely as one of free shape, for less. Of a rig that differs
-        from an effect a little a law of free shape has that little more.
+        Less than `LEFT` of the latent force (mean square). Some effects together imitate what no
+        catalogue has; what has their own shape is as likely as one of free shape, for less.
         """
         base, last = chain[0], chain[-1]
         named = any(move.candidate for move in last.moves)
@@ -149,7 +148,7 @@ class EffectSelection:
             plain = plain if move.is_nuisance else without(self.trials, base, plain, move)
         free = max(free_laws(self.trials, plain), key=lambda each: each.fit.value)
         self.free = free if self._is_ahead(free, plain) else None
-        is_less = free.latent < LEFT**2 * last.latent
+        is_less = free.latent < LEFT * last.latent
         return [base, free] if is_less and self._is_ahead(free, last) else chain
 
     def _pruned(self, chain: list[Hypothesis]) -> list[Hypothesis]:

@@ -450,7 +450,10 @@ def test_a_torque_that_no_effect_has_is_written_as_a_law_and_drafted_as_a_user_e
     assert again.gap["angle_deg"].after < 0.2 * gap.parameters
 
 
-@pytest.mark.parametrize(("plant", "at", "stiffness"), [("joint", 0.3, 2.0), ("slide", 0.03, 2e3)])
+@pytest.mark.parametrize(
+    ("plant", "at", "stiffness"),
+    [("joint", 0.3, 2.0), pytest.param("slide", 0.03, 2e3, marks=pytest.mark.campaign)],
+)
 def test_a_bumper_is_no_effect_that_imitates_it_but_a_law_that_is_written(plant, at, stiffness):
     def pushed(force, position):
         return force - stiffness * max(position - at, 0.0)
