@@ -1,8 +1,8 @@
-"""Residual laws of free shape: straight lines between nine values, or twice as many.
+"""Residual laws of free shape: straight lines between nine or seventeen values.
 
 They are no physical phenomena. A diagnosis fits them where no effect of the catalogue explains the
-data: they give the missing force, torque, or load as a function of position, speed, pressure or
-load. A model with such a law can be simulated although the cause is unknown.
+data: they give the missing force, torque, damping or load as a function of position, speed,
+pressure or load. A model with such a law can be simulated although the cause is unknown.
 """
 
 from collections import namedtuple
@@ -17,7 +17,7 @@ HEIGHTS = 9
 """Number of values of a law, equally spaced."""
 
 FREE_LAW = "free law"
-"""What such a law replaces: another one."""
+"""What `Effect.replaces` says of such a law."""
 
 _FORCE = Quantity("N", -1e6, 1e6, "fitted, whatever it is", 0.0, usual=5.0)
 _TORQUE = Quantity("N m", -1e6, 1e6, "fitted, whatever it is", 0.0, usual=0.5)
@@ -49,7 +49,7 @@ def _parameters(
     return tuple_class
 
 
-ForceOfContraction = _parameters("ForceOfContraction", "mm", -1e6, 1e6, (-10, 70))
+ForceOfContraction = _parameters("ForceOfContraction", "mm", -50, 200, (-10, 70))
 ForceOfPosition = _parameters("ForceOfPosition", "mm", -1e6, 1e6, (-50, 100), halves=True)
 ForceOfVelocity = _parameters("ForceOfVelocity", "mm/s", -1e6, 1e6, (-50, 100))
 TorqueOfAngle = _parameters("TorqueOfAngle", "deg", -1e7, 1e7, (-90, 180), _TORQUE, True)
@@ -110,7 +110,7 @@ def torque_of_angle(angle, p):
 
 
 def force_of_velocity(velocity, p):
-    """Missing force, or torque, as a function of speed; positive shortens the muscle.
+    """Missing force, or torque, as a function of speed; positive as the position grows.
 
     Args:
         velocity: rate of contraction x' (m/s), or of the angle (rad/s).
@@ -127,7 +127,7 @@ def damping_of_contraction(contraction, velocity, p):
     """Missing force on the slide of a damping that depends on the contraction (N).
 
     Args:
-        contraction: (m).
+        contraction: shortening x (m).
         velocity: rate of contraction x' (m/s).
         p: DampingOfPosition.
     Returns:

@@ -13,11 +13,7 @@ from pma_gym.discovery.answer.trial_records import gaps
 from pma_gym.discovery.diagnosis import Verdict
 from pma_gym.discovery.grey_box.effect_selection import EffectSelection
 from pma_gym.discovery.grey_box.hypothesis import Hypothesis
-from pma_gym.discovery.grey_box.latent_law import (
-    fitted_law,
-    latent_force,
-    latent_line,
-)
+from pma_gym.discovery.grey_box.latent_law import fitted_law, latent_force, latent_line
 from pma_gym.discovery.grey_box.predictions import Predictions
 from pma_gym.discovery.grey_box.proposal import Proposal
 from pma_gym.discovery.grey_box.sizes import estimate, named_effects
@@ -62,7 +58,7 @@ class Conclusions:
         material = proposal.share(last) > MATERIAL and proposal.is_latent
         incomplete = material or proposal.is_latent and self.predictions.misfit(last) > COMPLETE
         # A law of free shape that trials left out do not confirm has refuted the others as well.
-        if self.predictions.path[-1].free or material and not last.moves:
+        if self.predictions.path[-1].free_law or material and not last.moves:
             return "unknown"
         if last.moves and proposal.left > LEFT and incomplete:
             return "unknown"
@@ -109,7 +105,7 @@ class Conclusions:
     @property
     def written(self) -> Hypothesis:
         """Whose model is written: nothing is added to it where nothing carries enough."""
-        none = self.verdict == "unknown" and not self.proposal.last.free
+        none = self.verdict == "unknown" and not self.proposal.last.free_law
         return self.predictions.path[0] if none else self.proposal.last
 
     @cached_property
@@ -130,7 +126,7 @@ class Conclusions:
     @cached_property
     def law(self) -> ResidualLaw | None:
         """What the latent force goes with."""
-        base, free = self.predictions.path[0], self.selection.free
+        base, free = self.predictions.path[0], self.selection.free_law
         if free is None or free.latent > LEFT * base.latent:
             return None
         return fitted_law(free, 1.0 - free.latent / base.latent, self.selection.trials.model.rig)

@@ -74,7 +74,8 @@ class EffectSelection:
         self.candidates = [each for each in candidates if each.name not in (*late, *SIMULATED)]
         self.gains: dict[str, float] = {}
         self.fitted: dict[frozenset[str], Hypothesis] = {}
-        self.free: Hypothesis | None = None
+        # What the latent force goes with, where a law of free shape is ahead of none.
+        self.free_law: Hypothesis | None = None
 
     def run(self) -> list[Hypothesis]:
         """From the model as it came to the last hypothesis that is worth its price.
@@ -129,9 +130,9 @@ class EffectSelection:
             beam = [best]
             if self.trials.is_bent(best[-1].fit.point, MATERIAL):
                 beam += [c for c in chains[1:BEAM] if self._lead(c, c[:-1]) > 0.0]
-        return self._unless_free(self._pruned(best))
+        return self._or_free_law(self._pruned(best))
 
-    def _unless_free(self, chain: list[Hypothesis]) -> list[Hypothesis]:
+    def _or_free_law(self, chain: list[Hypothesis]) -> list[Hypothesis]:
         """A law of free shape in place of what was added, where it is ahead and leaves less.
 
         Less than `LEFT` of the latent force (mean square). Some effects together imitate what no
@@ -147,7 +148,7 @@ class EffectSelection:
         for move in last.moves if plain is last else ():
             plain = plain if move.is_nuisance else without(self.trials, base, plain, move)
         free = max(free_laws(self.trials, plain), key=lambda each: each.fit.value)
-        self.free = free if self._is_ahead(free, plain) else None
+        self.free_law = free if self._is_ahead(free, plain) else None
         is_less = free.latent < LEFT * last.latent
         return [base, free] if is_less and self._is_ahead(free, last) else chain
 

@@ -56,7 +56,7 @@ class Move:
         return self.candidate is None and set(self.slots) <= set(OTHERS)
 
     @property
-    def is_free(self) -> bool:
+    def is_free_law(self) -> bool:
         """Whether it is a law of free shape: no effect of the catalogue has its shape."""
         return bool(self.candidate) and CATALOGUE[self.candidate.effect].replaces == FREE_LAW
 
@@ -80,13 +80,13 @@ class Hypothesis:
     alike: tuple["Hypothesis", ...] = ()
 
     @property
-    def free(self) -> CandidateEffect | None:
+    def free_law(self) -> CandidateEffect | None:
         """The law of free shape among what was added."""
-        return next((move.candidate for move in self.moves if move.is_free), None)
+        return next((move.candidate for move in self.moves if move.is_free_law), None)
 
     @property
     def latent(self) -> float:
-        """Mean square of the latent force over trials, times their number (N^2, N^2 m^2)."""
+        """Sum over trials of the latent force's mean square (N^2, N^2 m^2)."""
         return float(np.sum(np.square(self.fit.point.forces)))
 
     @property

@@ -25,7 +25,7 @@ FORCES = {"slide": ("force on the slide", "N"), "joint": ("torque on the joint",
 """What a latent force is, and its unit, by rig."""
 
 DAMPING = "damping"
-"""Kind of a law of free shape that is none of forces."""
+"""In the names of laws of free shape that give a damping, not a force."""
 
 PERIODS, FINER, CUBIC = 3.0, 4, 3
 """Of a line in the shortest trial at least; points of its spectrum within its width; and the
@@ -37,10 +37,10 @@ def fitted_law(made: Hypothesis, explained: float, rig: Rig) -> ResidualLaw:
 
     With the band of its shape: an offset of the drive makes up for a constant.
     """
-    assert made.free is not None
-    effect, fitted = CATALOGUE[made.free.effect], made.fit
+    assert made.free_law is not None
+    effect, fitted = CATALOGUE[made.free_law.effect], made.fit
     own = {i: c for i, c in enumerate(fitted.coordinates) if c.name.startswith(f"{effect.name}.")}
-    ends = made.free.model.parameters[effect.name]
+    ends = made.free_law.model.parameters[effect.name]
     at = np.linspace(ends.first, ends.first + ends.reach, len(own))
     # It is linear in its values.
     stems = [c.name.partition(".")[2] for c in own.values()]

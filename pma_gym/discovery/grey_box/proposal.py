@@ -182,7 +182,7 @@ class Proposal:
 
 def _is_sized(each: Hypothesis, move: Move) -> bool:
     """Whether some size of an added effect, or of a clock's error, is surely not none."""
-    if move.candidate is None or move.is_free:
+    if move.candidate is None or move.is_free_law:
         # A deviation is never surely more than none: its price decides. So it does for a law that
         # is known up to a constant.
         sizes = [(n, abs(value_of(each.fit.point, n))) for n in move.slots if n == CLOCK.name]

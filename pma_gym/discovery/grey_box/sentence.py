@@ -69,7 +69,7 @@ def _verdict(conclusions: Conclusions) -> str:
         return f"{named} missing{rest}: {_misses(conclusions)}{approximate}."
     if conclusions.verdict == "unknown":
         words = f" It {conclusions.law.words}." if conclusions.law else ""
-        if conclusions.proposal.last.free:
+        if conclusions.proposal.last.free_law:
             words += f" With that law {_misses(conclusions)}."
             left = _left(conclusions, conclusions.predictions.path[0])
         if conclusions.line:

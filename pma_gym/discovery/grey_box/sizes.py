@@ -19,7 +19,7 @@ def named_effects(proposal: Proposal) -> tuple[NamedEffect, ...]:
     made = []
     rivals = [*proposal.last.rivals, *[()] * len(proposal.last.moves)]
     for move, others in zip(proposal.last.moves, rivals, strict=False):
-        if move.candidate is not None and not move.is_free:
+        if move.candidate is not None and not move.is_free_law:
             own = {c.name for c in proposal.predictions.path[0].fit.coordinates}
             names = [
                 c.name

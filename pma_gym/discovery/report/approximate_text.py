@@ -13,7 +13,7 @@ MANY = 10.0
 def left_text(known: Approximate) -> str:
     """How much of the misfit is left: `law approximate, 11 % of the misfit ... is left`."""
     laws = "law" if len(known.effects) == 1 else "laws"
-    unseen = " in trials left out" if known.held_out else ""
+    unseen = " in readings left out" if known.held_out else ""
     share = percent(max(known.left, 0.0))
     return f"{laws} approximate, {share} of the misfit beyond noise (mean square) is left{unseen}"
 

@@ -4,6 +4,7 @@ from pma_gym.discovery.diagnosis import Diagnosis
 from pma_gym.discovery.report.effect_text import effect_names
 from pma_gym.discovery.report.figure_text import duration, figure, listed, signal_name
 from pma_gym.discovery.result.noise import Nuisance
+from pma_gym.effects.residual_law import FREE_LAW
 
 
 def what_to_do(diagnosis: Diagnosis) -> list[str]:
@@ -100,7 +101,7 @@ def _describe(diagnosis: Diagnosis) -> list[str]:
     write = (
         "Write it as a user effect, one Python file, and diagnose again with `--effect FILE.py`."
     )
-    if set(diagnosis.model.effects) - set(diagnosis.given.effects):
+    if any(effect.replaces == FREE_LAW for effect in diagnosis.model.effects.values()):
         steps.append(
             "Use the amended model, `model.toml` beside this page, until you know what acts: it "
             "has that law, value by value."

@@ -132,7 +132,7 @@ def _gap_blocks(diagnosis: Diagnosis) -> list[Block]:
         return []
     held = any(gap.held_out for gap in diagnosis.gap.values())
     seen = (
-        "“Held out”: each trial is predicted by a fit that has not seen it."
+        "“Held out”: each trial, or stretch of a single one, is predicted by a fit without it."
         if held
         else "No trial was held out: the figures are those of the fit itself."
     )

@@ -36,7 +36,7 @@ class Gap:
         parameters: its parameters refitted, nothing added.
         after: the amended model.
         floor: the noise of the measurement.
-        held_out: whether `after` comes from fits that had not seen the trial.
+        held_out: whether `after` comes from fits without the trial, or stretch of a single one.
     """
 
     before: float
