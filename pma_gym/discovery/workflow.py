@@ -1,7 +1,8 @@
 """The diagnosis from trials to answer: slides and joints by one likelihood, others step by step."""
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -149,25 +150,26 @@ class _Work:
         words = (*(dataset.checked or ()), *words, *slower)
         journal = Journal(self.folder, trials, given, f"diagnosis 8 seed {self.seed}")
         logged = [Logged.of(given, i, trial) for i, trial in enumerate(trials)]
-        floors = self._timed("noise", lambda: initial_floors(given, logged, named, dataset.sensors))
+        with self._timed("noise"):
+            floors = initial_floors(given, logged, named, dataset.sensors)
         problem = self._problem(given, named, logged, floors)
         self._tell("refitting parameters", 0, 1)
-        refitted = self._timed("parameters", lambda: self._refitted(problem))
+        with self._timed("parameters"):
+            refitted = self._refitted(problem)
         problem, refitted, faster = with_fast_motion(problem, refitted)
         if faster:
             given, words = problem.given, (*words, faster)
             logged = [Logged.of(given, i, trial) for i, trial in enumerate(trials)]
         problem, refitted = self._with_lines(problem, refitted, logged, named)
         every = _candidates(given, named) if search else []
-        selection = self._timed(
-            "selection",
-            lambda: (
+        with self._timed("selection"):
+            selection = (
                 select(problem, refitted, every, self.seed, journal, self._tell)
                 if search
                 else _nothing(problem, refitted)
-            ),
-        )
-        selection = self._timed("nested laws", lambda: self._nested(selection))
+            )
+        with self._timed("nested laws"):
+            selection = self._nested(selection)
         findings = Findings(
             named=tuple(named),
             given=given,
@@ -179,15 +181,15 @@ class _Work:
             searched=search,
             seed=self.seed,
         )
-        findings = replace(
-            findings, elimination=self._timed("fewest", lambda: _backward_elimination(findings))
-        )
+        with self._timed("fewest"):
+            findings = replace(findings, elimination=_backward_elimination(findings))
         findings = _without_worse(findings)
-        findings = self._timed("confirmation", lambda: self._confirmed(findings))
-        findings = self._timed("adequacy", lambda: self._adequate(findings, logged))
-        diagnosis = self._timed(
-            "report", lambda: diagnosis_from_findings(findings, self._tell, self.propose)
-        )
+        with self._timed("confirmation"):
+            findings = self._confirmed(findings)
+        with self._timed("adequacy"):
+            findings = self._adequate(findings, logged)
+        with self._timed("report"):
+            diagnosis = diagnosis_from_findings(findings, self._tell, self.propose)
         warnings = (*words, *diagnosis.warnings)
         return replace(diagnosis, warnings=warnings, seconds=dict(self.seconds))
 
@@ -209,7 +211,8 @@ class _Work:
             journal,
             self.propose and search,
         )
-        return self._timed("grey box", lambda: answered(given, named, every, *options))
+        with self._timed("grey box"):
+            return answered(given, named, every, *options)
 
     def _problem(
         self,
@@ -375,11 +378,11 @@ class _Work:
         bare = self._judged(self._confirmed(bare), logged)
         return bare if is_tolerated(bare) else findings
 
-    def _timed(self, step: str, work: Callable):  # noqa: ANN202
+    @contextmanager
+    def _timed(self, step: str) -> Iterator[None]:
         begun = time.perf_counter()
-        done = work()
+        yield
         self.seconds[step] = time.perf_counter() - begun
-        return done
 
     def _tell(self, step: str, done: int, total: int) -> None:
         if self.watcher is not None:
