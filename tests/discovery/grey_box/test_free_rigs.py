@@ -1,5 +1,6 @@
 """Diagnoses of slides and joints of another simulator: what is wrong with them is known."""
 
+import inspect
 import re
 import subprocess
 import sys
@@ -16,7 +17,7 @@ from benchmarks.hidden_effects.rigs.laws import PositionFriction
 from pma_gym import Plant
 from pma_gym.data.datasets.dataset import read_dataset
 from pma_gym.data.trial import Trial
-from pma_gym.discovery import diagnose
+from pma_gym.discovery import diagnose, refit
 from pma_gym.discovery.grey_box.latent_law import latent_line, line_over_position
 from pma_gym.discovery.grey_box.prepared_trials import PreparedTrials
 from pma_gym.effects import CATALOGUE
@@ -292,6 +293,27 @@ def test_what_slides_takes_no_short_steps_however_little_friction_gives(preslidi
     assert sum(len(each.lengths) for each in rows) < 32_512
     white = prepared.white(prepared.box(known, steps=Steps(16, 32)), [right])
     assert np.mean(white**2) == pytest.approx(1.0, abs=0.2)
+
+
+def test_six_calls_lead_to_where_the_verdict_is_made():
+    depths = []
+
+    def watch(frame, event, _):
+        at = frame.f_code
+        if event == "call" and (at.co_name, Path(at.co_filename).stem) == (
+            "verdict",
+            "conclusions",
+        ):
+            names = [each.function for each in inspect.getouterframes(frame, context=0)]
+            depths.append(names.index("refit"))
+
+    sys.setprofile(watch)
+    try:
+        # As `diagnose`, without a search for effects.
+        refit(logs("joint", 2.0), model("joint"))
+    finally:
+        sys.setprofile(None)
+    assert 0 < min(depths) <= 6
 
 
 @pytest.mark.campaign
