@@ -7,7 +7,7 @@ from concurrent.futures import ThreadPoolExecutor
 from copy import copy
 from dataclasses import dataclass
 from functools import cache, cached_property
-from math import ceil, hypot
+from math import hypot
 from typing import Annotated, NamedTuple
 
 import numpy as np
@@ -171,18 +171,6 @@ class Point:
         return 1.0 / (1.0 + self.clock)
 
 
-class Steps(NamedTuple):
-    """Numbers of integration steps between two rows.
-
-    Attributes:
-        usual: where the motion does not turn.
-        turning: where it may, if the model has dry friction.
-    """
-
-    usual: int
-    turning: int
-
-
 class Rows:
     """One trial as the filter reads it.
 
@@ -200,14 +188,15 @@ class Rows:
             hundreds of them would outweigh all that moves.
         extrapolated: whether a filter runs with twice the steps too, and what comes out is
             extrapolated to none.
-        noise: of each signal's readings, where steps are shorter in which the motion may turn.
+        noise: of each signal's readings, where steps in which the motion may turn are divided into
+            `TURNS` each.
     """
 
     def __init__(
         self,
         logged: Logged,
         channels: Sequence[int],
-        steps: Steps,
+        steps: int,
         linear: bool,
         block: int,
         stride: int = 1,
@@ -242,7 +231,7 @@ class Rows:
         held = self._motor[:-1] * between + 0.5 * rise * between**2
         self._sums = np.concatenate([[0.0], np.cumsum(held)])
         self._starts: dict[tuple[int | None, int | None], tuple[float, float, float]] = {}
-        shares = np.arange(steps.usual) / steps.usual
+        shares = np.arange(steps) / steps
         spans = np.diff(self.time)[:, None]
         edges = np.append(self.time[:-1, None] + spans * shares, self.time[-1])
         counts = np.ones(len(edges) - 1, int)
@@ -250,8 +239,8 @@ class Rows:
             shown = np.where(logged.counts[channels[0]] > 0, logged.measured[channels[0]], np.nan)
             turns = turning(self._at, shown, noise[0] * block**0.5, channels[0] > 0) * between
             passed = np.interp(edges, self._at, np.concatenate([[0.0], np.cumsum(turns)]))
-            counts[np.diff(passed) > 0.0] = ceil(steps.turning / steps.usual)
-        per_row = counts.reshape(-1, steps.usual).sum(axis=1)
+            counts[np.diff(passed) > 0.0] = TURNS
+        per_row = counts.reshape(-1, steps).sum(axis=1)
         self._stepped(np.concatenate([[0, 0], np.cumsum(per_row)]), divided(edges, counts))
         self.finer: Rows | None = None
         if extrapolated:
@@ -320,6 +309,10 @@ class Rows:
             y = readings[there, speed, 0]
             motion, spread = float(y[0]), float(np.std(y)) + 1e-12
         return first, motion, spread
+
+
+TURNS = 2
+"""Steps that a step is divided into in which the motion may turn."""
 
 
 def divided(edges: Array, counts: NDArray[np.int64]) -> Array:

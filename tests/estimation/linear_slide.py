@@ -7,7 +7,7 @@ from scipy.linalg import block_diag, expm
 
 from pma_gym.data.trial import Trial
 from pma_gym.effects import CATALOGUE
-from pma_gym.estimation.innovations import GreyBox, Point, Rows, Steps
+from pma_gym.estimation.innovations import GreyBox, Point, Rows
 from pma_gym.estimation.logged import Logged
 from pma_gym.plant.model import Model
 
@@ -78,9 +78,7 @@ def logged(seed=0, rows=200, rate=100.0, force=2.0, memory=0.1, missing=False, u
 def box(trials, model, channels=(0,), steps=4, linear=False):
     """The package's filter over trials."""
     every = [Logged.of(model, i, trial) for i, trial in enumerate(trials)]
-    return GreyBox(
-        model, [Rows(one, channels, Steps(steps, 2 * steps), linear, 1) for one in every], channels
-    )
+    return GreyBox(model, [Rows(one, channels, steps, linear, 1) for one in every], channels)
 
 
 def point(made, force=2.0, memory=0.1, **numbers):

@@ -8,7 +8,7 @@ import pytest
 from pma_gym import Plant
 from pma_gym.data.trial import Trial
 from pma_gym.effects import CATALOGUE
-from pma_gym.estimation.innovations import Rows, Steps, counted, log_likelihood, predictions
+from pma_gym.estimation.innovations import Rows, counted, log_likelihood, predictions
 from pma_gym.estimation.logged import Logged
 from pma_gym.plant.model import Model
 from tests.estimation.linear_slide import NOISES, box, kalman, logged, point, slide
@@ -174,21 +174,7 @@ def test_a_dwell_in_a_coarse_step_counts_as_its_first_and_last_reading():
     time = np.arange(9) / 100
     log = Trial(time, {"load_command": 0 * time}, {"contraction": 1e-3 * steps})
     one = Logged.of(slide(), 0, log)
-    coarse, fine = (Rows(one, (0,), Steps(2, 4), False, 1, coarse=[each]) for each in (True, False))
+    coarse, fine = (Rows(one, (0,), 2, False, 1, coarse=[each]) for each in (True, False))
     read = np.array([1, 1, 0, 0, 1, 1, 1, 0, 1], bool)
     assert np.array_equal(coarse.there[:, 0], read)
     assert fine.there.all() and coarse.measured.all()
-
-
-def test_steps_are_shorter_where_the_motion_turns_and_cover_every_row():
-    time = np.arange(201) / 100
-    log = Trial(time, {"load_command": 0 * time}, {"contraction": 0.02 * np.cos(3.0 * time)})
-    one = Logged.of(slide(), 0, log)
-    rows = Rows(one, (0,), Steps(2, 8), False, 1, noise=[1e-6])
-    per_row = np.diff(rows.firsts)[1:]
-    assert np.allclose(np.add.reduceat(rows.lengths, rows.firsts[1:-1]), np.diff(time))
-    # It turns at pi / 3 s.
-    turned = np.flatnonzero(per_row == 8) / 100
-    assert set(per_row) == {2, 8} and len(turned) < 10
-    assert np.abs(turned - np.pi / 3).max() < 0.03
-    assert 1.04 in turned

@@ -35,10 +35,10 @@ from pma_gym.discovery.thresholds import RESOLVED, SETTLED
 from pma_gym.estimation.innovations import (
     TREND,
     TRIAL,
+    TURNS,
     GreyBox,
     Point,
     Rows,
-    Steps,
     counted,
     is_rugged,
 )
@@ -187,9 +187,7 @@ class Question:
         runs, predicted = [], []
         for rival in self.rivals:
             # Where a motion turns that nobody has seen is not known: all steps are divided.
-            steps = rival.box.rows[0].steps
-            if is_rugged(rival.box.model):
-                steps = Steps(steps.turning, steps.turning)
+            steps = rival.box.rows[0].steps * (TURNS if is_rugged(rival.box.model) else 1)
             rows = Rows(logged, self.trials.channels, steps, self.trials.linear, 1)
             box = GreyBox(rival.box.model, [rows], rival.box.channels, rival.box.threads)
             unread = counted(rows, np.zeros(len(rows.time), bool))

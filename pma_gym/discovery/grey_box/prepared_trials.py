@@ -9,14 +9,14 @@ from numpy.typing import NDArray
 from pma_gym.discovery.grey_box.thresholds import FAINT, HORIZON_S, LOUD, STEP_MISS, STEP_SHARE
 from pma_gym.discovery.result.misfit import rms
 from pma_gym.effects.effect import signals
-from pma_gym.estimation.innovations import COLOUR, GreyBox, Point, Rows, Steps, is_rugged
+from pma_gym.estimation.innovations import COLOUR, GreyBox, Point, Rows, is_rugged
 from pma_gym.estimation.likelihood_fit import Coordinate
 from pma_gym.estimation.logged import Logged
 from pma_gym.plant.model import Model
 
 Array = NDArray[np.float64]
 
-ROUGH, CLOSE, FINAL = (10.0, 80_000), (1.0, 80_000), (0.1, 80_000)
+ROUGH, CLOSE, FINAL = (10.0, 200_000), (1.0, 200_000), (0.1, 1_000_000)
 """Integration steps are halved until that changes all innovations by less, and their number.
 
 Sum of the changes' squares, in deviations of the innovations, so that log likelihoods are right to
@@ -26,14 +26,7 @@ short enough.
 """
 
 SHORTEST_S = 1e-4
-"""Shortest step (s) where the motion does not turn; half of it where it may."""
-
-JUMPS = 100
-"""Of so many innovations one may change by another stop of the motion, where halved steps are those
-in which it does not turn."""
-
-TURNING = 0.75
-"""Share of all steps with which those in which the motion may turn are halved at most."""
+"""Shortest step (s) where the motion does not turn."""
 
 MISSED, HOPELESS = 4.0, 0.1
 """Mean square of innovations, in their deviations, from which on a point is no fit, and share of
@@ -124,8 +117,7 @@ class PreparedTrials:
         self.block = self._block(readings)
         total = sum(len(each.time) for each in logged) / self.block
         self.stride = max(1, int(total / MOST_ROWS))
-        least = max(1, self.stride * self.block // 8)
-        self.steps = self.turning = Steps(least, 2 * least)
+        self.steps = max(1, self.stride * self.block // 8)
         self.span = (
             self.stride
             * self.block
@@ -134,7 +126,7 @@ class PreparedTrials:
         longest = max(float(each.time[-1] - each.time[0]) for each in logged)
         self.memory = 4.0 * self.span, max(longest / 5.0, 8.0 * self.span)
         self.noise = [n / self.block**0.5 for n in self.noise]
-        self._rows: dict[tuple[Steps, bool, bool], list[Rows]] = {}
+        self._rows: dict[tuple[int, bool, bool], list[Rows]] = {}
         self.force = self._force()
 
     def without(self, hums: Sequence[Hum]) -> "PreparedTrials":
@@ -169,16 +161,14 @@ class PreparedTrials:
             forces.append(drive.law(*(at[name] for name in signals(drive.law))))
         return abs(forces[0] - forces[1]) or 1.0
 
-    def box(self, model: Model, linear: bool | None = None, steps: Steps | None = None) -> GreyBox:
+    def box(self, model: Model, linear: bool | None = None, steps: int = 0) -> GreyBox:
         """The filter of a model over the trials, with so many integration steps a row.
 
-        Where friction turns nothing is smooth: steps are finer there, the same for all models that
-        have it, for likelihoods jump by more than models differ; and none is extrapolated.
+        Where friction turns nothing is smooth: steps are finer there, and none is extrapolated.
         """
+        steps = steps or self.steps
         linear = self.linear if linear is None else linear
-        rugged, steps = is_rugged(model), steps or self.steps
-        if rugged:
-            steps = Steps(*map(max, steps, self.turning))
+        rugged = is_rugged(model)
         key = steps, linear, rugged
         if key not in self._rows:
             how = self.channels, steps, linear, self.block, self.stride, self.coarse
@@ -190,46 +180,28 @@ class PreparedTrials:
         self,
         model: Model,
         point: Point,
-        steps: Steps | None = None,
+        steps: int = 0,
         linear: bool | None = None,
         level: tuple[float, int] = CLOSE,
     ) -> GreyBox:
-        """The filter of a model with as many steps as it needs at a point, at least so many.
-
-        With dry friction first those in which the motion may turn are halved; models share them.
-        """
-        change, total = level
-        rugged = is_rugged(model)
+        """The filter of a model with as many steps as it needs at a point, at least so many."""
+        (change, total), rows = level, self.stride * self.block
+        steps = steps or self.steps
         box = self.box(model, linear, steps)
         white = self.white(box, [point])
-        for turning in (True, False) if rugged else (False,):
-            while (halved := self._halved(box.rows[0].steps, turning)) is not None:
-                finer = self.box(model, linear, halved)
-                most_steps = TURNING * total if turning else total
-                if sum(each.firsts[-1] for each in finer.rows) > most_steps:
-                    break
-                after = self.white(finer, [point])
-                most = HOPELESS * np.sum(after**2) if self.is_missed(after) else change
-                differ = np.sort(((after - white) ** 2).ravel())
-                if rugged and not turning:
-                    differ = differ[: -len(differ) // JUMPS]
-                if np.sum(differ) < most:
-                    break
-                box, white = finer, after
-        if rugged:
-            self.turning = box.rows[0].steps
+        while (
+            2 * steps * SHORTEST_S <= self.span
+            and 2 * sum(each.firsts[-1] for each in box.rows) <= total
+        ):
+            # Where several rows are one step, the next has each by itself.
+            steps = rows if steps < rows < 2 * steps else 2 * steps
+            finer = self.box(model, linear, steps)
+            before, white = white, self.white(finer, [point])
+            most = HOPELESS * np.sum(white**2) if self.is_missed(white) else change
+            if np.sum((white - before) ** 2) < most:
+                break
+            box = finer
         return box
-
-    def _halved(self, steps: Steps, turning: bool) -> Steps | None:
-        """Steps of half the length, where the motion turns or elsewhere; None below the shortest.
-
-        Where several rows are one step, the next has each by itself.
-        """
-        rows, now = self.stride * self.block, steps.turning if turning else steps.usual
-        if 2 * now * SHORTEST_S > self.span * (2 if turning else 1):
-            return None
-        more = rows if now < rows < 2 * now else 2 * now
-        return Steps(steps.usual, more) if turning else Steps(more, max(more, steps.turning))
 
     def white(self, box: GreyBox, points: Sequence[Point]) -> Array:
         """Innovations over their deviations, shape (points, readings)."""

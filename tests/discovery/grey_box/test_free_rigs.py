@@ -22,7 +22,7 @@ from pma_gym.discovery.grey_box.latent_law import latent_line, line_over_positio
 from pma_gym.discovery.grey_box.prepared_trials import PreparedTrials
 from pma_gym.effects import CATALOGUE
 from pma_gym.effects.user_effects import load_effects
-from pma_gym.estimation.innovations import Point, Steps
+from pma_gym.estimation.innovations import Point
 from pma_gym.estimation.logged import Logged
 from pma_gym.estimation.smoother import Smoothed, smoothed
 from pma_gym.plant.model import Model
@@ -291,7 +291,7 @@ def test_what_slides_takes_no_short_steps_however_little_friction_gives(preslidi
     rows = prepared.precise(known, right).rows
     assert min(each.lengths.min() for each in rows) > 0.99e-2 / 64
     assert sum(len(each.lengths) for each in rows) < 32_512
-    white = prepared.white(prepared.box(known, steps=Steps(16, 32)), [right])
+    white = prepared.white(prepared.box(known, steps=16), [right])
     assert np.mean(white**2) == pytest.approx(1.0, abs=0.2)
 
 
