@@ -178,3 +178,14 @@ def test_a_dwell_in_a_coarse_step_counts_as_its_first_and_last_reading():
     read = np.array([1, 1, 0, 0, 1, 1, 1, 0, 1], bool)
     assert np.array_equal(coarse.there[:, 0], read)
     assert fine.there.all() and coarse.measured.all()
+
+
+@pytest.mark.parametrize("block", [1, 2, 8])
+def test_a_blocks_reading_is_where_the_motion_is_at_its_middle(block):
+    time = np.arange(800) / 1000
+    log = Trial(time, {"load_command": 0 * time}, {"contraction": np.cos(10.0 * time)})
+    rows = Rows(Logged.of(slide(), 0, log), (0,), 1, False, block)
+    off = (rows.readings[:, 0, 0] - np.cos(10.0 * rows.time))[2:-2]
+    # A mean's bend is w^2 (N^2 - 1) dt^2 / 24 of the motion, 2.6e-4 at 8 rows.
+    bend = 10.0**2 * (block**2 - 1) * 1e-6 / 24.0
+    assert np.abs(off).max() < 0.02 * bend + 1e-12
