@@ -215,7 +215,7 @@ class Rows:
             self.readings[:, i, 0] = total / np.maximum(counts, 1.0)
             self.readings[:, i, 1] = counts == self.sizes
         self._opening = self.time[:FIRST_BLOCKS], self.readings[:FIRST_BLOCKS].copy()
-        bends = _bends(self.readings, block)[::stride]
+        shifts = _mean_shifts(self.readings, block)[::stride]
         self.time, self.readings = (
             self.time[::stride],
             np.ascontiguousarray(self.readings[::stride]),
@@ -225,7 +225,7 @@ class Rows:
             dwells = np.diff(self.readings[:, i, 0]) == 0.0
             self.readings[1:-1, i, 1] *= ~(dwells[1:] & dwells[:-1])
         self.there = self.readings[:, :, 1] > 0
-        self.readings[:, :, 0] -= bends
+        self.readings[:, :, 0] -= shifts
         self._motor, self._at = np.asarray(logged.motor, float), np.asarray(logged.time, float)
         between = np.diff(self._at)
         rise = np.diff(self._motor) / between if linear else np.zeros(len(between))
@@ -317,17 +317,17 @@ TURNS = 2
 """Steps that a step is divided into in which the motion may turn."""
 
 
-def _bends(readings: Array, block: int) -> Array:
-    """What the motion bends within each block moves its mean by, shape (rows, signals).
+def _mean_shifts(readings: Array, block: int) -> Array:
+    """What the curvature of the motion shifts each block's mean by, shape (rows, signals).
 
     Two blocks before and behind tell; at the ends, and where a reading is missing, none is known.
     """
     means, read = readings[:, :, 0], readings[:, :, 1] > 0
-    bends = np.zeros_like(means)
+    shifts = np.zeros_like(means)
     known = read[4:] & read[2:-2] & read[:-4]
     share = (1.0 - block**-2) / (24.0 * 2**2)
-    bends[2:-2] = share * (means[4:] - 2.0 * means[2:-2] + means[:-4]) * known
-    return bends
+    shifts[2:-2] = share * (means[4:] - 2.0 * means[2:-2] + means[:-4]) * known
+    return shifts
 
 
 def divided(edges: Array, counts: NDArray[np.int64]) -> Array:

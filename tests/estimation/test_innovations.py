@@ -186,6 +186,6 @@ def test_a_blocks_reading_is_where_the_motion_is_at_its_middle(block):
     log = Trial(time, {"load_command": 0 * time}, {"contraction": np.cos(10.0 * time)})
     rows = Rows(Logged.of(slide(), 0, log), (0,), 1, False, block)
     off = (rows.readings[:, 0, 0] - np.cos(10.0 * rows.time))[2:-2]
-    # A mean's bend is w^2 (N^2 - 1) dt^2 / 24 of the motion, 2.6e-4 at 8 rows.
-    bend = 10.0**2 * (block**2 - 1) * 1e-6 / 24.0
-    assert np.abs(off).max() < 0.02 * bend + 1e-12
+    # A mean is off by w^2 (N^2 - 1) dt^2 / 24 of the motion, 2.6e-4 at 8 rows.
+    shift = 10.0**2 * (block**2 - 1) * 1e-6 / 24.0
+    assert np.abs(off).max() < 0.02 * shift + 1e-12
