@@ -181,7 +181,7 @@ class _Work:
             searched=search,
             seed=self.seed,
         )
-        with self._timed("fewest"):
+        with self._timed("backward elimination"):
             findings = replace(findings, elimination=_backward_elimination(findings))
         findings = _without_worse(findings)
         with self._timed("confirmation"):

@@ -215,7 +215,9 @@ class Rows:
             self.readings[:, i, 0] = total / np.maximum(counts, 1.0)
             self.readings[:, i, 1] = counts == self.sizes
         self._opening = self.time[:FIRST_BLOCKS], self.readings[:FIRST_BLOCKS].copy()
-        shifts = _mean_shifts(self.readings, block)[::stride]
+        apart = np.asarray(logged.time, float) - np.repeat(self.time, self.sizes)
+        spread = np.add.reduceat(apart**2, starts) / self.sizes
+        shifts = _mean_shifts(self.readings, self.time, spread)[::stride]
         self.time, self.readings = (
             self.time[::stride],
             np.ascontiguousarray(self.readings[::stride]),
@@ -317,16 +319,23 @@ TURNS = 2
 """Steps that a step is divided into in which the motion may turn."""
 
 
-def _mean_shifts(readings: Array, block: int) -> Array:
+def _mean_shifts(readings: Array, time: Array, spread: Array) -> Array:
     """What the curvature of the motion shifts each block's mean by, shape (rows, signals).
 
-    Two blocks before and behind tell; at the ends, and where a reading is missing, none is known.
+    Half of the second derivative times the mean square of the times about their mean. Two blocks
+    before and behind tell it; at the ends, and where a reading is missing, none is known.
+
+    Args:
+        readings: means of blocks, and whether each is known, shape (rows, signals, 2).
+        time: means of the blocks' times (s), shape (rows,).
+        spread: mean squares of the times about them (s^2), shape (rows,).
     """
     means, read = readings[:, :, 0], readings[:, :, 1] > 0
     shifts = np.zeros_like(means)
     known = read[4:] & read[2:-2] & read[:-4]
-    share = (1.0 - block**-2) / (24.0 * 2**2)
-    shifts[2:-2] = share * (means[4:] - 2.0 * means[2:-2] + means[:-4]) * known
+    slopes = (means[2:] - means[:-2]) / (time[2:] - time[:-2])[:, None]
+    second = 2.0 * (slopes[2:] - slopes[:-2]) / (time[4:] - time[:-4])[:, None]
+    shifts[2:-2] = 0.5 * spread[2:-2, None] * second * known
     return shifts
 
 

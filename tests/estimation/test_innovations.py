@@ -189,3 +189,12 @@ def test_a_blocks_reading_is_where_the_motion_is_at_its_middle(block):
     # A mean is off by w^2 (N^2 - 1) dt^2 / 24 of the motion, 2.6e-4 at 8 rows.
     shift = 10.0**2 * (block**2 - 1) * 1e-6 / 24.0
     assert np.abs(off).max() < 0.02 * shift + 1e-12
+
+
+def test_a_straight_motion_shifts_no_mean_where_rows_are_lost_or_uneven():
+    rng = np.random.default_rng(3)
+    time = np.cumsum(rng.uniform(0.5e-3, 1.5e-3, 800))
+    time[400:] += 0.5
+    log = Trial(time, {"load_command": 0 * time}, {"contraction": 0.2 * time})
+    rows = Rows(Logged.of(slide(), 0, log), (0,), 1, False, 8)
+    assert np.abs(rows.readings[:, 0, 0] - 0.2 * rows.time).max() < 1e-12

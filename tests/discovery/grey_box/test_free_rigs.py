@@ -299,11 +299,8 @@ def test_six_calls_lead_to_where_the_verdict_is_made():
     depths = []
 
     def watch(frame, event, _):
-        at = frame.f_code
-        if event == "call" and (at.co_name, Path(at.co_filename).stem) == (
-            "verdict",
-            "conclusions",
-        ):
+        at = frame.f_code.co_name, Path(frame.f_code.co_filename).stem
+        if event == "call" and at == ("verdict", "conclusions"):
             names = [each.function for each in inspect.getouterframes(frame, context=0)]
             depths.append(names.index("refit"))
 
