@@ -17,7 +17,7 @@ from pma_gym.discovery.grey_box.prepared_trials import CLOCK, FINAL, LEAST_FORCE
 from pma_gym.discovery.grey_box.slots import gains_of_drive, quantity_of, slot
 from pma_gym.discovery.grey_box.thresholds import FAR, LIKE, NOISES, SMALL
 from pma_gym.discovery.result.misfit import rms
-from pma_gym.discovery.thresholds import COMPLETE, SURE
+from pma_gym.discovery.thresholds import COMPLETE, CONFIDENCE, SURE
 from pma_gym.estimation.likelihood_fit import value_of, with_tied, with_values
 
 Array = NDArray[np.float64]
@@ -149,6 +149,27 @@ class Proposal:
     def delayed(self) -> bool:
         """Whether a delay of the command is named."""
         return self.delay_gain > LIKE
+
+    @property
+    def delays(self) -> tuple[float, float]:
+        """Interval of a named delay (s).
+
+        A held command is a line half a row later. Where the likelihood does not tell which it is,
+        the interval holds the delays of both.
+        """
+        trials, last = self.selection.trials, self.last
+        held, linear = (
+            max(hold_fits(trials, last, kind), key=lambda each: each.fit.value).fit
+            for kind in (False, True)
+        )
+        same, other = (linear, held) if trials.linear else (held, linear)
+        alike = [last.fit, other] if other.value > same.value - LIKE else [last.fit]
+        ends = [
+            each.point.delay + side * each.deviations["delay"]
+            for each in alike
+            for side in (-CONFIDENCE, CONFIDENCE)
+        ]
+        return max(min(ends), 0.0), max(ends)
 
     @cached_property
     def far(self) -> dict[str, float]:

@@ -37,19 +37,14 @@ def named_effects(proposal: Proposal) -> tuple[NamedEffect, ...]:
             alike = tuple(other for other in others if TREND not in other and TRIAL not in other)
             made.append(NamedEffect(move.candidate.name, alike, _chance(proposal, move), sizes))
     if proposal.delayed:
-        late, error = (
-            1e3 * v
-            for v in (
-                proposal.last.fit.point.delay,
-                CONFIDENCE * proposal.last.fit.deviations["delay"],
-            )
-        )
+        late = proposal.last.fit.point.delay
+        value, low, high = (1e3 * v for v in (late, *proposal.delays))
         made.append(
             NamedEffect(
                 "drive_delay",
                 _late(proposal),
                 float(np.exp(-min(proposal.delay_gain, 600.0))),
-                {"delay_ms": Estimate(late, max(late - error, 0.0), late + error, "ms")},
+                {"delay_ms": Estimate(value, low, high, "ms")},
             )
         )
     return tuple(made)

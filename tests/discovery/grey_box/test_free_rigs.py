@@ -173,16 +173,24 @@ def test_friction_that_one_trial_alone_has_is_said_with_its_trial_and_size():
     assert inertia_of(diagnosis, "slide") == pytest.approx(1.0, rel=0.02)
 
 
-def test_a_drive_that_weakens_from_trial_to_trial_is_said_with_its_size():
-    diagnosis = diagnosed("slide", NEAR["slide"], gain=(1.02, 1.0, 0.98))
-    said = re.search(r"gain_n_per_v falls by .*?\((-[\d.]+) N/V", diagnosis.sentence)
+@pytest.mark.parametrize(
+    ("plant", "gain", "command"),
+    [
+        pytest.param("slide", 100.0, "motor voltage (V)", marks=pytest.mark.campaign),
+        ("joint", 1.0, "torque command (N m)"),
+    ],
+)
+def test_a_drive_that_weakens_from_trial_to_trial_is_said_with_its_size(plant, gain, command):
+    diagnosis = diagnosed(plant, NEAR[plant], gain=(1.02, 1.0, 0.98))
+    said = re.search(r"gain\w* falls by .*?\((-[\d.]+)", diagnosis.sentence)
     assert said and not diagnosis.effects, diagnosis.sentence
-    # Of 100 N/V.
-    assert float(said[1]) == pytest.approx(-2.0, abs=0.3)
+    assert float(said[1]) == pytest.approx(-0.02 * gain, abs=0.003 * gain)
     # Before, the latent force is what the drive has too much or too little of; after, nothing.
     forces = [trial.latent for trial in diagnosis.trials]
-    for force, share in zip(forces, (-0.02, 0.0, 0.02), strict=True):
-        load = 100.0 * (force.over["motor voltage (V)"] - 5.0)
+    # A slide's contraction falls where its load rises.
+    middle, way = (5.0, -1.0) if plant == "slide" else (0.0, 1.0)
+    for force, share in zip(forces, (0.02, 0.0, -0.02), strict=True):
+        load = way * gain * (force.over[command] - middle)
         assert np.polyfit(load, force.before, 1)[0] == pytest.approx(share, abs=0.003)
         assert np.std(force.after) < 0.001 * np.std(load)
 
@@ -295,6 +303,28 @@ def test_what_slides_takes_no_short_steps_however_little_friction_gives(preslidi
     assert np.mean(white**2) == pytest.approx(1.0, abs=0.2)
 
 
+def test_a_delay_holds_for_commands_held_or_linear_where_readings_do_not_tell():
+    # Of commands as smooth as these, linear ones 8 ms late are held ones that are 3 ms late.
+    inertia, damping, *_ = RIGS["joint"]
+    generator, trials, fine = np.random.default_rng(5), [], 2e-4
+    for _ in range(3):
+        time, phases = np.arange(200) / RATE_HZ, generator.uniform(0.0, 6.0, 2)
+        torque = sum(
+            0.2 * np.sin(6.283 * f * time + p) for f, p in zip((0.7, 1.9), phases, strict=True)
+        )
+        late = np.interp(np.arange(10_000) * fine + 0.5 * fine - 0.008, time, torque, left=0.0)
+        spin, angle, share = 0.0, np.zeros(10_001), 0.5 * fine * damping / inertia
+        for k, push in enumerate(late * fine / inertia):
+            former, spin = spin, (spin * (1.0 - share) + push) / (1.0 + share)
+            angle[k + 1] = angle[k] + 0.5 * fine * (former + spin)
+        read = angle[:-1:50] + 4e-4 * generator.standard_normal(200)
+        trials.append(Trial(time, {"torque_command": torque}, {"angle": read}))
+    diagnosis = diagnose(trials, model("joint"), propose=False)
+    (late,) = (each for each in diagnosis.effects if each.name == "drive_delay")
+    size = late.parameters["delay_ms"]
+    assert size.low < 3.0 < 8.0 < size.high < size.low + 7.0, size
+
+
 def test_six_calls_lead_to_where_the_verdict_is_made():
     depths = []
 
@@ -307,7 +337,7 @@ def test_six_calls_lead_to_where_the_verdict_is_made():
     sys.setprofile(watch)
     try:
         # As `diagnose`, without a search for effects.
-        refit(logs("joint", 2.0), model("joint"))
+        refit(logs("joint", 1.0), model("joint"))
     finally:
         sys.setprofile(None)
     assert 0 < min(depths) <= 6
