@@ -174,15 +174,20 @@ def test_friction_that_one_trial_alone_has_is_said_with_its_trial_and_size():
 
 
 @pytest.mark.parametrize(
-    ("plant", "gain", "command"),
+    ("plant", "gain", "name", "unit", "command"),
     [
-        pytest.param("slide", 100.0, "motor voltage (V)", marks=pytest.mark.campaign),
-        ("joint", 1.0, "torque command (N m)"),
+        pytest.param(
+            *("slide", 100.0, "two_way_drive.gain_n_per_v", " N/V", "motor voltage (V)"),
+            marks=pytest.mark.campaign,
+        ),
+        ("joint", 1.0, "torque_drive.gain", "", "torque command (N m)"),
     ],
 )
-def test_a_drive_that_weakens_from_trial_to_trial_is_said_with_its_size(plant, gain, command):
+def test_a_drive_that_weakens_from_trial_to_trial_is_said_with_its_size(
+    plant, gain, name, unit, command
+):
     diagnosis = diagnosed(plant, NEAR[plant], gain=(1.02, 1.0, 0.98))
-    said = re.search(r"gain\w* falls by .*?\((-[\d.]+)", diagnosis.sentence)
+    said = re.search(rf"{name} falls by .*?\((-[\d.]+){unit} \(95 %", diagnosis.sentence)
     assert said and not diagnosis.effects, diagnosis.sentence
     assert float(said[1]) == pytest.approx(-0.02 * gain, abs=0.003 * gain)
     # Before, the latent force is what the drive has too much or too little of; after, nothing.
