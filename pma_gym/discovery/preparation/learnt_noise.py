@@ -125,6 +125,9 @@ def _drift(
         if not apart.size:
             continue
         apart = apart[_reading_rows(logged[i], logged[j])]
+        if len(apart) < MOST_WAVES + NEAR:
+            # The cosines of so few readings are no basis: they tell no slow wave from noise.
+            continue
         at, there = np.arange(len(apart)), np.isfinite(apart)
         apart = np.interp(at, at[there], apart[there])
         squares.append((_cosines(len(apart), MOST_WAVES + NEAR) @ (apart - apart.mean())) ** 2)
