@@ -91,7 +91,8 @@ class Rig:
         }
         free = self.problem.own.free
         own = dict(zip(free, values(start_model, free).tolist(), strict=True))
-        return self.problem.fit(self.initial_model.replace(own), chosen, starts)
+        fit = self.problem.fit(self.initial_model.replace(own), chosen, starts)
+        return None if fit is None else self.problem.until_converged(fit, chosen)
 
     def fit(self, effects: Sequence[str], amended: Model) -> Model:
         """The better of fits of some effects that begin at an amended model and at the given one.

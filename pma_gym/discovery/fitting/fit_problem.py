@@ -250,6 +250,19 @@ class FitProblem:
         refit = self.fit(self._eased(fit.model, extra, ever_less), extra)
         return min(filter(None, (fit, refit)), key=_chi_square)
 
+    def until_converged(self, fit: Fitted, extra: Sequence[CandidateEffect] = ()) -> Fitted:
+        """A fit, gone on with from where it ended until it converges or gains no more.
+
+        In a direction in which chi-square is rugged a search spends its rounds on ever smaller
+        steps of all parameters. One that begins where it ended takes whole ones again.
+        """
+        while not fit.converged:
+            further = self.fit(fit.model, extra)
+            if further is None or fit.chi_square - further.chi_square < FLAT:
+                break
+            fit = further
+        return fit
+
     def _eased(
         self, model: Model, extra: Sequence[CandidateEffect], larger: Sequence[float]
     ) -> Model:

@@ -98,11 +98,11 @@ def fitted(
         if fit is not None and (best is None or fit.chi_square < best.chi_square):
             best = fit
         # As much as the look promised, or near at last: no other beginning is needed. Nor is one
-        # where the last two ended alike.
+        # where the last two ended alike. What did not converge says nothing of what others bring.
         if best is not None and (
             alike or not problem.far(best)
             if caught
-            else before.chi_square - best.chi_square >= each.gain
+            else best.converged and before.chi_square - best.chi_square >= each.gain
         ):
             break
     kept = 0.0 if best is None else before.chi_square - best.chi_square
@@ -294,7 +294,11 @@ def refit(
         held: what its model holds beside the values of the fit, for the journal.
     """
     what = f"again {held}".strip()
-    return _once(what, problem, fit, chosen, journal, lambda: problem.fit(fit.model, chosen) or fit)
+
+    def search() -> Fitted:
+        return problem.until_converged(problem.fit(fit.model, chosen) or fit, chosen)
+
+    return _once(what, problem, fit, chosen, journal, search)
 
 
 def _once(

@@ -1,11 +1,11 @@
 """The dissertation's tables as trials, and what is made of their diagnosis."""
 
+import json
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from benchmarks.measured import diagnose_tables
 from benchmarks.measured.diagnose_tables import (
     DIAGNOSED_KPA,
     UNSEEN_KPA,
@@ -109,14 +109,16 @@ def test_a_refit_comes_nearer_to_the_tables_than_the_printed_numbers():
 
 
 @pytest.mark.campaign
-def test_a_job_judges_what_a_diagnosis_adds_as_the_notebook_has_it(monkeypatch, tmp_path):
-    added = iter(["nonlinear_stiffness", ""])
-
-    def diagnose(data, model, **_):
-        named = [SimpleNamespace(name=name, why=ADDED) for name in [next(added)] if name]
-        return SimpleNamespace(sentence="", verdict="effect", candidates=named, model=model)
-
-    monkeypatch.setattr(diagnose_tables, "diagnose", diagnose)
-    extension = [each["extension_mm"] for each in run_measured(tmp_path).values()]
-    assert extension == pytest.approx([10.31, 3.40, 1.52, 0.60], abs=0.06)
-    assert "nonlinear_stiffness" in load_model(tmp_path / "model.toml").parameters
+def test_the_job_on_the_tables_comes_as_near_as_the_notebook_has_it(tmp_path):
+    """Seven minutes: two rounds name five effects; pressures left out are missed by little more than repeats."""
+    errors = run_measured(tmp_path, jobs=2)
+    extension = [each["extension_mm"] for each in errors.values()]
+    assert extension == pytest.approx([10.31, 3.39, 0.68, 0.60], abs=0.06)
+    named = json.loads((tmp_path / "measured.json").read_text())["effects"]
+    assert sorted(named) == [
+        "cable_slack",
+        "current_imbalance",
+        "hysteresis",
+        "nonlinear_stiffness",
+        "passive_stretch",
+    ]

@@ -10,6 +10,8 @@ from pma_gym.codegen.threads.thread_pool import linear_algebra_alone
 from pma_gym.data import calibration
 from pma_gym.data.trial import Trial
 from pma_gym.discovery import diagnose
+from pma_gym.discovery.fitting.fit_problem import FitProblem
+from pma_gym.discovery.fitting.free_parameters import FreeParameters
 from pma_gym.discovery.preparation.noise import white_noise
 from pma_gym.discovery.preparation.whitened_residuals import WhitenedResiduals
 from pma_gym.estimation import simulated_trials
@@ -64,6 +66,17 @@ def measured():
 @pytest.fixture(scope="module")
 def best(measured):
     return fitted(OFF, measured, FREE)
+
+
+def test_a_fit_that_ran_out_of_rounds_goes_on_until_it_converges(best, measured, monkeypatch):
+    monkeypatch.setattr("pma_gym.discovery.fitting.fit_problem.ROUNDS", 2)
+    own = FreeParameters(FREE, np.full(len(FREE), np.inf))
+    problem = FitProblem(measured, OFF, own, tuple(map(white_noise, sensors.deviations(OFF))))
+    begun = problem.fit(OFF)
+    assert not begun.converged and begun.chi_square > best.chi_square + 100.0
+    whole = problem.until_converged(begun)
+    assert whole.chi_square < best.chi_square + 4.0
+    assert np.all(np.abs(whole.values - best.values) < np.sqrt(np.diag(best.covariance)))
 
 
 def test_a_fit_recovers_the_parameters_within_their_standard_errors(best, measured):
