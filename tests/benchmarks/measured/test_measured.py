@@ -110,7 +110,7 @@ def test_a_refit_comes_nearer_to_the_tables_than_the_printed_numbers():
 
 @pytest.mark.campaign
 def test_the_job_on_the_tables_comes_as_near_as_the_notebook_has_it(tmp_path):
-    """Seven minutes: two rounds name five effects; pressures left out are missed by little more than repeats."""
+    """Seven minutes: five effects in two rounds; of pressures left out 0.68 mm, of repeats 0.60."""
     errors = run_measured(tmp_path, jobs=2)
     extension = [each["extension_mm"] for each in errors.values()]
     assert extension == pytest.approx([10.31, 3.39, 0.68, 0.60], abs=0.06)
