@@ -72,9 +72,9 @@ def test_a_fit_that_ran_out_of_rounds_goes_on_until_it_converges(best, measured,
     monkeypatch.setattr("pma_gym.discovery.fitting.fit_problem.ROUNDS", 2)
     own = FreeParameters(FREE, np.full(len(FREE), np.inf))
     problem = FitProblem(measured, OFF, own, tuple(map(white_noise, sensors.deviations(OFF))))
-    begun = problem.fit(OFF)
-    assert not begun.converged and begun.chi_square > best.chi_square + 100.0
-    whole = problem.until_converged(begun)
+    short = problem.fit(OFF)
+    assert not short.converged and short.chi_square > best.chi_square + 100.0
+    whole = problem.until_converged(short)
     assert whole.chi_square < best.chi_square + 4.0
     assert np.all(np.abs(whole.values - best.values) < np.sqrt(np.diag(best.covariance)))
 

@@ -48,7 +48,7 @@ def test_a_drift_is_learnt_from_repeats_and_one_that_repeats_is_structure() -> N
 
 
 def test_white_repeats_of_few_readings_show_no_drift() -> None:
-    """A drift is told by what lies beside its waves; three readings have none.
+    """What lies beside a drift's waves says what noise is; three readings have nothing there.
 
     Half a period and more of three or four readings is all that they can differ by: white noise of
     thirty such repeats counted as a drift of 1.7 noises in 18 draws of 20.
