@@ -148,7 +148,7 @@ class _Work:
             return replace(said, warnings=words, seconds=dict(self.seconds))
         given, slower = with_recorded_bandwidth(given, trials)
         words = (*(dataset.checked or ()), *words, *slower)
-        journal = Journal(self.folder, trials, given, f"diagnosis 9 seed {self.seed}")
+        journal = Journal(self.folder, trials, given, f"diagnosis 10 seed {self.seed}")
         logged = [Logged.of(given, i, trial) for i, trial in enumerate(trials)]
         with self._timed("noise"):
             floors = initial_floors(given, logged, named, dataset.sensors)

@@ -78,6 +78,7 @@ def _block(name: str, outcomes: Sequence[Outcome]) -> dict[str, Any]:
         "by_size": _by_size(some),
         "gap_closed": _gap_closed(name, some),
         "sizes": _sizes(some),
+        "parameters": _held(some),
         "seconds": _seconds(some),
         "misses": [_miss(outcome) for outcome in some if _missed(outcome)],
         "unanswered": [_miss(outcome) for outcome in some if not outcome.answered],
@@ -152,6 +153,19 @@ def _sizes(some: Sequence[Outcome]) -> dict[str, Any]:
             path: {"median_error": float(np.median(each)), "covered": rate(covered[path])}
             for path, each in sorted(errors.items())
         },
+    }
+
+
+def _held(some: Sequence[Outcome]) -> dict[str, Any]:
+    """Intervals of the models' own parameters."""
+    by_path: dict[str, list[bool]] = {}
+    for outcome in some:
+        for path, holds in outcome.held.items():
+            by_path.setdefault(path, []).append(holds)
+    every = [holds for each in by_path.values() for holds in each]
+    return {
+        "covered": rate(every, COVERAGE),
+        "by_parameter": {path: rate(each) for path, each in sorted(by_path.items())},
     }
 
 

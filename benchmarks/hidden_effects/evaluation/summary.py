@@ -6,7 +6,8 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.hidden_effects.evaluation.records import Measured, measured_text
-from benchmarks.hidden_effects.evaluation.targets import percent
+from benchmarks.hidden_effects.evaluation.scoring import rate
+from benchmarks.hidden_effects.evaluation.targets import COVERAGE, percent
 from pma_gym.documents import read_json
 from pma_gym.pages.document import Block, Heading, Paragraph, TextTable, to_html, to_markdown
 
@@ -61,7 +62,10 @@ def report_blocks(document: dict[str, Any]) -> list[Block]:
         TextTable(
             "Rates with 95 % Wilson intervals",
             ["block", "figure", "measured", "target", "verdict"],
-            [row for name, each in figures.items() for row in _rates(name, each)],
+            [
+                *(row for name, each in figures.items() for row in _rates(name, each)),
+                _pooled(figures),
+            ],
             2,
         ),
     ]
@@ -91,9 +95,27 @@ def _rates(name: str, figures: dict[str, Any]) -> list[list[str]]:
     if error["value"] is not None:
         value = f"{100 * error['value']:.1f} %, n {sizes['covered']['n']}"
         rows.append([name, "fitted size, median error", value, *_verdict(error)])
-        covered = sizes["covered"]
-        rows.append([name, "95 % intervals cover", percent(covered), *_verdict(covered)])
+    for kind, intervals in _intervals(figures).items():
+        rows.append(
+            [name, f"95 % intervals of {kind} hold", percent(intervals), *_verdict(intervals)]
+        )
     return rows
+
+
+def _intervals(figures: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
+    """Those of effects and of the models' own parameters, where a block has some."""
+    # Figures of before parameters were counted have none.
+    kinds = {"effects": figures["sizes"], "parameters": figures.get("parameters", {})}
+    counted = {kind: each["covered"] for kind, each in kinds.items() if "covered" in each}
+    return {kind: each for kind, each in counted.items() if each["n"]}
+
+
+def _pooled(blocks: Mapping[str, Any]) -> list[str]:
+    """The row of all intervals of all blocks."""
+    every = [each for block in blocks.values() for each in _intervals(block).values()]
+    hits, count = (sum(each[name] for each in every) for name in ("hits", "n"))
+    figure = rate([True] * hits + [False] * (count - hits), COVERAGE)
+    return ["all", "95 % intervals hold, pooled", percent(figure), *_verdict(figure)]
 
 
 def _verdict(figure: dict[str, Any]) -> list[str]:
@@ -110,6 +132,7 @@ def _own(figures: dict[str, Any]) -> list[Block]:
         text += " at most."
     tables: list[tuple[Any, Any]] = [
         (figures["sizes"]["by_parameter"], _sizes),
+        (figures.get("parameters", {}).get("by_parameter"), _held),
         (figures["misses"], _misses),
     ]
     return [Paragraph(text), *(table(some) for some, table in tables if some)]
@@ -121,6 +144,11 @@ def _sizes(parameters: dict[str, Any]) -> TextTable:
         for name, each in parameters.items()
     ]
     return TextTable("Fitted sizes", ["parameter", "median error", "intervals cover"], rows)
+
+
+def _held(parameters: dict[str, Any]) -> TextTable:
+    rows = [[name, percent(each)] for name, each in parameters.items()]
+    return TextTable("The model's own parameters", ["parameter", "intervals hold"], rows)
 
 
 def _misses(misses: list[dict[str, Any]]) -> TextTable:

@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from benchmarks.hidden_effects.evaluation.intervals import held
 from benchmarks.hidden_effects.evaluation.troubles import RIGHT_STRUCTURE, judged
 from benchmarks.hidden_effects.generation.effect_size import UNTOLD
 from benchmarks.hidden_effects.generation.effects import ALL
@@ -62,6 +63,7 @@ class Outcome:
         closed: shares of the gap closed on held-out trials.
         size_errors: by `effect.parameter`, relative error of a fitted size.
         covered: by `effect.parameter`, whether the interval holds the truth.
+        held: the same of the model's own parameters (`intervals.held`).
         seconds: how long the diagnosis took.
         number: of the case in its set.
         ratio: the smallest r of what is hidden, None where nothing is.
@@ -93,6 +95,7 @@ class Outcome:
     closed: list[float] = field(default_factory=list)
     size_errors: dict[str, float] = field(default_factory=dict)
     covered: dict[str, bool] = field(default_factory=dict)
+    held: dict[str, bool] = field(default_factory=dict)
     seconds: float | None = None
     number: int = 0
     ratio: float | None = None
@@ -175,6 +178,7 @@ def compare(truth: Mapping[str, Any], answer: Mapping[str, Any]) -> Outcome:
         answered=verdict != NO_ANSWER,
         sentence=answer.get("sentence", ""),
         left=_left(truth, answer),
+        held=held(truth, answer),
     )
     _parameters(outcome, truth, answer)
     for gap in answer["gap"].values():

@@ -60,9 +60,9 @@ def estimate(made: Fit, name: str) -> Estimate:
         low, high = max(low, quantity.lower), min(high, quantity.upper)
     coordinate = next(c for c in made.coordinates if c.name == name)
     ends = {coordinate.lower: "lower", coordinate.upper: "upper"}
-    if name.endswith(".presliding") and value == coordinate.lower:
-        # It is too short for any reading to show.
-        return Estimate(value_, quantity.lower, high, quantity.unit)
+    if name.endswith(".presliding") and value_ <= quantity.lower:
+        # Shorter than any that a model is written with.
+        return Estimate(quantity.lower, quantity.lower, max(high, quantity.lower), quantity.unit)
     return Estimate(value_, low, high, quantity.unit, ends.get(value, ""))
 
 

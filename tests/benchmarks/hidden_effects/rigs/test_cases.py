@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from benchmarks.hidden_effects.evaluation.scoring import count
+from benchmarks.hidden_effects.evaluation.summary import report
 from benchmarks.hidden_effects.evaluation.verdicts import compare
 from benchmarks.hidden_effects.generation.cases import BLOCKS
 from benchmarks.hidden_effects.generation.files import write_case
@@ -220,3 +221,42 @@ def test_answers_are_judged_by_what_their_case_hides():
     assert rates["outside: unknown"] == (1, 2)
     assert figures["sizes"]["median_error"]["value"] == pytest.approx(0.05)
     assert len(figures["misses"]) == 5
+
+
+def test_intervals_of_parameters_are_counted_where_the_truth_is_known():
+    rig = {"kind": "slide", "inertia": 2.0, "damping": 30.0, "stiffness": 0.0}
+    known = truth("nothing") | {"rig": rig, "friction": {"true": 1.3}}
+    parameters = {
+        "slide.mass_kg": value(2.05, 1.9, 2.1),
+        "symmetric_damping.intercept_n_s_per_mm": value(0.0315, 0.031, 0.032),
+        "coulomb_friction.static_n": value(1.25, 1.2, 1.4),
+        "spring.stiffness_n_per_mm": value(0.1, 0.0, 0.2),
+        "two_way_drive.middle_v": value(5.0, 4.9, 5.1),
+    }
+    said = answer("parameters", 0.01) | {"parameters": parameters}
+    holds = {
+        "slide.mass_kg": True,
+        "symmetric_damping.intercept_n_s_per_mm": False,
+        "coulomb_friction.static_n": True,
+    }
+    assert compare(known, said).held == holds
+    # An incomplete model claims no numbers; a damping by direction has two.
+    assert compare(known, said | {"verdict": "unknown"}).held == {}
+    two = truth("one effect", ("directional_damping", 0.5)) | {"rig": rig}
+    assert compare(two, said).held == {"slide.mass_kg": True}
+    not_known = said | {"parameters": {"slide.mass_kg": value(2.05, None, None)}}
+    assert compare(known, not_known).held == {}
+    station = {"block": "single", "effects": [], "base_factors": {}, "base": {"radius": 0.0254}}
+    radius = {"rotor.radius_mm": value(25.5, 25.0, 26.0)}
+    assert compare(station, answer("effect", 0.01) | {"parameters": radius}).held == {
+        "rotor.radius_mm": True
+    }
+    counted = count([compare(known, said)])["blocks"]["rigs"]["parameters"]
+    assert (counted["covered"]["hits"], counted["covered"]["n"]) == (2, 3)
+    effect = truth("one effect", ("coulomb_friction", 2.0)) | {"rig": rig}
+    named = answer("effect", 0.01, ("coulomb_friction", {"dynamic_n": value(2.1, 1.9, 2.3)}))
+    both = count([compare(known, said), compare(effect, named)])["blocks"]
+    both["rigs"]["measured"] = [{"commit": "abc", "date": "2026-11-30", "method": "abc"}]
+    assert "| all | 95 % intervals hold, pooled | 75.0 % (30.1-95.4), 3 of 4 |" in report(
+        {"seed": 1, "blocks": both}
+    )
