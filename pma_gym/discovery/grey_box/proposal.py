@@ -18,9 +18,13 @@ from pma_gym.discovery.grey_box.slots import gains_of_drive, quantity_of, slot
 from pma_gym.discovery.grey_box.thresholds import FAR, LIKE, NOISES, SMALL
 from pma_gym.discovery.result.misfit import rms
 from pma_gym.discovery.thresholds import COMPLETE, CONFIDENCE, SURE
-from pma_gym.estimation.likelihood_fit import value_of, with_tied, with_values
+from pma_gym.estimation.innovations import Point
+from pma_gym.estimation.likelihood_fit import Coordinate, value_of, with_tied, with_values
 
 Array = NDArray[np.float64]
+
+IDEAL = 0.01
+"""Share of a fitted presliding distance at which friction lacks a tenth of what it lacks there."""
 
 
 @dataclass(frozen=True)
@@ -39,12 +43,19 @@ class Proposal:
 
     @cached_property
     def last(self) -> Hypothesis:
-        """The hypothesis that is proposed, without a delay that is not worth its price."""
-        chosen, trials = self._chosen, self.selection.trials
-        now = chosen.fit
-        box = trials.precise(chosen.box.model, now.point, chosen.box.rows[0].steps, level=FINAL)
-        now = fit(box, now.point, now.coordinates, now.tied, near=True)
-        chosen = replace(chosen, box=box, fit=now)
+        """The hypothesis that is proposed, without what is not worth its price.
+
+        A delay, and a distance before friction slips: what it lacks until then goes with the root.
+        """
+        now = self._chosen.fit
+        chosen = self._precise(now.point, now.coordinates)
+        slips = {c.name for c in now.coordinates if c.name.endswith(".presliding")}
+        if slips:
+            at = chosen.fit.point
+            start = with_values(at, {name: IDEAL * value_of(at, name) for name in slips})
+            ideal = self._precise(start, [c for c in now.coordinates if c.name not in slips])
+            if ideal.fit.value > chosen.fit.value - chosen.price_of(len(slips)):
+                chosen = ideal
         prompt = [c for c in chosen.fit.coordinates if c.name != "delay"]
         start = replace(chosen.fit.point, delay=0.0)
         made = fit(chosen.box, start, prompt, chosen.fit.tied, near=True)
@@ -52,6 +63,13 @@ class Proposal:
         if made.value > least:
             chosen = replace(chosen, fit=made)
         return chosen
+
+    def _precise(self, start: Point, coordinates: Sequence[Coordinate]) -> Hypothesis:
+        """What is chosen, fitted once more from near its end with as many steps as it takes."""
+        chosen, trials = self._chosen, self.selection.trials
+        box = trials.precise(chosen.box.model, start, chosen.box.rows[0].steps, level=FINAL)
+        made = fit(box, start, coordinates, chosen.fit.tied, near=True)
+        return replace(chosen, box=box, fit=made)
 
     @cached_property
     def _chosen(self) -> Hypothesis:

@@ -104,7 +104,7 @@ def own_coordinates(box: GreyBox) -> tuple[list[Coordinate], dict[str, str]]:
     return coordinates, tied
 
 
-IDEAL = 1e-3
+SHORTEST = 1e-3
 """Least presliding distance of a fit, as a share of the least that a model is written with.
 
 What friction lacks at a turn goes with the root of it. At 0.1 nm the mass of a slide whose true
@@ -115,5 +115,5 @@ friction gives way at once came out 0.06 % too large, 13 standard errors.
 def presliding(effect: str) -> Coordinate:
     """How far a contact gives before it slides, which no list of parameters has free."""
     quantity = quantity_of(f"{effect}.presliding")
-    low, high = IDEAL * quantity.to_si(quantity.lower), quantity.to_si(quantity.upper)
+    low, high = SHORTEST * quantity.to_si(quantity.lower), quantity.to_si(quantity.upper)
     return Coordinate(f"{effect}.presliding", 1.0, True, low, high, 2.0)
