@@ -147,7 +147,9 @@ class Proposal:
         )
         # How an incomplete model's commands run between rows is not known to less than a row.
         unknown = 0.0 if self.predictions.misfit(last) < COMPLETE else row
-        if late < max(unknown, SURE * error):
+        # One shorter than a model may have is none.
+        quantity = quantity_of("drive_delay.delay")
+        if late < max(unknown, SURE * error, quantity.to_si(quantity.lower)):
             return 0.0
         price = np.log(len(self.candidates)) + last.price_of(1)
         return max(0.0, last.fit.value - self._prompt - float(price))

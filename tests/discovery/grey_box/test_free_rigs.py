@@ -8,6 +8,7 @@ from dataclasses import replace
 from functools import cache
 from math import cos, exp, radians
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -20,6 +21,7 @@ from pma_gym.data.trial import Trial
 from pma_gym.discovery import diagnose, refit
 from pma_gym.discovery.grey_box.latent_law import latent_line, line_over_position
 from pma_gym.discovery.grey_box.prepared_trials import PreparedTrials
+from pma_gym.discovery.grey_box.proposal import Proposal
 from pma_gym.effects import CATALOGUE
 from pma_gym.effects.user_effects import load_effects
 from pma_gym.estimation.innovations import Point
@@ -578,3 +580,22 @@ def test_a_force_over_the_position_has_its_period_whatever_goes_with_the_place(o
     force = 5.0 * np.sin(1.5 * x) + np.cos(6.283 * often * x + 0.3)
     trial = Smoothed(t, force, 0.0 * t, x, 0.0 * t, 0.0 * t)
     assert line_over_position([trial]) == pytest.approx(often, abs=0.25 / np.ptp(x))
+
+
+@pytest.mark.parametrize(("late", "is_named"), [(9e-7, False), (2e-6, True)])
+def test_a_delay_that_no_model_may_have_is_none(late, is_named):
+    """`drive_delay` begins at 1 us: a surer delay of 0.6 us ended in an error."""
+    fitted = SimpleNamespace(
+        point=SimpleNamespace(delay=late),
+        deviations={"delay": 1e-8},
+        coordinates=[SimpleNamespace(name="delay")],
+        value=100.0,
+    )
+    proposal = SimpleNamespace(
+        last=SimpleNamespace(fit=fitted, price_of=lambda numbers: 5.0),
+        candidates=["drive_delay"],
+        selection=SimpleNamespace(trials=SimpleNamespace(span=0.01, stride=1, block=1)),
+        predictions=SimpleNamespace(misfit=lambda each: 1.0),
+        _prompt=50.0,
+    )
+    assert Proposal.delay_gain.func(proposal) == (45.0 if is_named else 0.0)
