@@ -130,17 +130,17 @@ def _something(hit: Callable[[Outcome], bool | None]) -> Callable[[Outcome], boo
 
 
 _RIGS = (
-    Rate("one effect: right or in its group", _of("one effect", lambda o: o.near), Target(0.9)),
+    Rate("one effect: right or in its group", _of("one effect", lambda o: o.near), Target(0.92)),
     Rate("one effect: named right", _of("one effect", lambda o: o.right)),
     Rate("one effect: a spurious second", _of("one effect", lambda o: o.spurious)),
-    Rate("two effects: both named", _of("two effects", lambda o: o.hits == 2)),
+    Rate("two effects: both named", _of("two effects", lambda o: o.hits == 2), Target(0.7)),
     Rate("two effects: one of them, or its group", _of("two effects", lambda o: o.near)),
     Rate("outside: unknown", _of("outside", lambda o: o.verdict == "unknown")),
     Rate("outside: a false name", _of("outside", lambda o: o.verdict == "effect")),
     Rate(
         "hidden: confidently wrong, 3 noises left too",
         _something(lambda o: o.wrong or o.false_structure),
-        Target(most=0.02),
+        Target(most=0.01),
     ),
     Rate(
         "hidden: said to be of right structure", _something(lambda o: o.verdict in RIGHT_STRUCTURE)
@@ -185,7 +185,7 @@ GAP_BLOCKS = ("single", "faint", "parameters", "pair", *(f"single_{ugly}" for ug
 GAP_MEDIAN, GAP_TENTH = Target(least=0.95), Target(least=0.80)
 """Of (before - after) / (before - floor) on trials left out: median and tenth percentile."""
 
-SIZE_ERROR, COVERAGE = Target(most=0.05), Target(least=0.90, most=0.98)
+SIZE_ERROR, COVERAGE = Target(most=0.05), Target(least=0.92, most=0.97)
 """Median relative error of a fitted size; share of 95 % intervals that hold the truth."""
 
 
