@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
+from benchmarks.hidden_effects.evaluation.troubles import RIGHT_STRUCTURE
 from pma_gym.discovery.grey_box.slots import quantity_of, slot
 
 STATION: dict[str, str] = {
@@ -39,7 +40,7 @@ RIG: dict[str, str] = {
 }
 """The same of the other rigs."""
 
-COMPLETE = ("agrees", "parameters", "effect")
+COMPLETE = (*RIGHT_STRUCTURE, "effect")
 """Verdicts that say that the model is complete with what is named: then its numbers are claims."""
 
 

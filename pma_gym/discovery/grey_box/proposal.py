@@ -45,7 +45,7 @@ class Proposal:
     def last(self) -> Hypothesis:
         """The hypothesis that is proposed, without what is not worth its price.
 
-        A delay, and a distance before friction slips: what it lacks until then goes with the root.
+        That may be a delay, and the distance over which friction builds up before it slips.
         """
         now = self._chosen.fit
         chosen = self._precise(now.point, now.coordinates)

@@ -219,6 +219,23 @@ class Uneven(lab.Laboratory):
         return (PositionFriction(self.friction, 0.5 / self.campaign.rig.travel),)
 
 
+def test_numbers_of_a_rig_whose_friction_gives_way_at_once_are_as_sure_as_they_say(tmp_path):
+    """With a presliding distance of 1e-5 deg at least its friction is 5 standard errors off."""
+    hidden = lab.laboratory(223606798, 2, "nothing")
+    for file, text in hidden.texts().items():
+        (tmp_path / file).write_text(text, encoding="utf-8")
+    diagnosis = refit(read_dataset(tmp_path), tmp_path / "model.toml")
+    rig = hidden.campaign.rig
+    true = {
+        "joint_friction.static_n_m": hidden.friction,
+        "inertia.inertia_kg_m2": rig.inertia,
+        "joint_damping.coefficient_n_m_s": rig.damping,
+    }
+    for path, number in true.items():
+        now = diagnosis.parameters[path].now
+        assert abs(now.value - number) < 0.5 * 1.5 * (now.high - now.low), (path, now, number)
+
+
 @pytest.mark.campaign
 def test_a_jammed_trial_is_said_without_what_stood_in_for_it(tmp_path):
     hidden = lab.laboratory(911, 1, "one_trial")
@@ -584,7 +601,7 @@ def test_a_force_over_the_position_has_its_period_whatever_goes_with_the_place(o
 
 @pytest.mark.parametrize(("late", "is_named"), [(9e-7, False), (2e-6, True)])
 def test_a_delay_that_no_model_may_have_is_none(late, is_named):
-    """`drive_delay` begins at 1 us: a surer delay of 0.6 us ended in an error."""
+    """`drive_delay` begins at 1 us. A delay of 0.6 us, fitted and sure, ended in an error."""
     fitted = SimpleNamespace(
         point=SimpleNamespace(delay=late),
         deviations={"delay": 1e-8},
